@@ -192,9 +192,8 @@ def _check_views(run: RunReader, calibration: Calibration) -> None:
             f"calibration {calibration.id} has {sorted(calibration.views)}"
         )
     for name, view in calibration.views.items():
-        rows, columns = formats[name].shape
-        if (columns, rows) != view.mapping.image_size_px:
+        (rows, columns), (width, height) = formats[name].shape, view.mapping.image_size_px
+        if (columns, rows) != (width, height):
             raise CalibrationError(
-                f"run {run.header.run_id}, {name}: image of {columns} x {rows} px, "
-                f"calibrated for {view.mapping.image_size_px}"
+                f"run {run.header.run_id}, {name}: image of {columns} x {rows} px, calibrated for {width} x {height} px"
             )

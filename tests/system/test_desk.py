@@ -246,6 +246,7 @@ def test_the_state_is_one_word_however_long_the_name_of_the_calibration(
     expect(rig_state(page)).to_have_text("READY")
     box, calibration = rig_state(page).bounding_box(), page.get_by_role("status", name="current calibration")
     expect(calibration).to_have_attribute("title", long)
+    expect(page.locator(".desk-name")).to_have_attribute("title", server.services.config.name)
     bar = page.locator(".desk-row").bounding_box()
     assert box is not None
     assert bar is not None

@@ -24,9 +24,10 @@ def require_match(run_name: str, shot: Shot, calibration: Calibration) -> None:
         raise PipelineError(f"{run_name}, shot {shot.index}: exposures are missing, nothing to reconstruct")
     calibration.require_usable(shot.views)
     for name, exposures in shot.views.items():
-        (rows, columns), size_px = exposures.frame_a.shape, calibration.views[name].mapping.image_size_px
-        if (columns, rows) != size_px:
-            raise PipelineError(f"{run_name}, {name}: image of {columns} x {rows} px, calibrated for {size_px}")
+        (rows, columns), (width, height) = exposures.frame_a.shape, calibration.views[name].mapping.image_size_px
+        if (columns, rows) != (width, height):
+            size = f"image of {columns} x {rows} px, calibrated for {width} x {height} px"
+            raise PipelineError(f"{run_name}, {name}: {size}")
 
 
 def shot_intensities(

@@ -50,7 +50,8 @@ class Header:
     def _add_name(self) -> None:
         config = self._context.services.config
         ui.icon("blur_on", size="26px").classes("text-primary")
-        with ui.element("div").classes("desk-name"):
+        with ui.element("div").classes("desk-name") as name:
+            name.props["title"] = config.name  # there is not always room for all of it
             ui.label("tomoshadow").classes("font-medium")
             ui.label(config.name).classes("text-xs")
         if config.simulation is not None:

@@ -109,7 +109,7 @@ def test_what_does_not_fit_the_calibration_is_told(bench: Bench) -> None:
     bench.shot = replace(bench.shot, views=cut)
     view = bench.volume.look()
     assert (view.number, view.remedy) == (0, "choose another calibration, or calibrate again")
-    assert "image of 400 x 100 px" in (view.problem or "")
+    assert "image of 400 x 100 px, calibrated for 400 x 300 px" in (view.problem or "")
 
 
 def test_an_incomplete_shot_leaves_the_last_complete_one(bench: Bench) -> None:
