@@ -17,7 +17,7 @@ from daq.files.outcome_note import read_note, write_note
 from daq.files.recovery import INTERRUPTED, close_run, last_sign_of_life_utc, set_aside
 from daq.files.run_directory import RunReader
 from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, write_run_file
-from daq.files.shot_file import read_formats, read_shot_file
+from daq.files.shot_file import read_began, read_formats, read_shot_file
 from daq.files.storage import storing
 from daq.files.verification import ASKED_SHOTS, FlawKind, is_strange, runs_of_shots, verify
 
@@ -90,7 +90,7 @@ def _header_of_shot(path: Path) -> RunHeader:
     shot = read_shot_file(path, header)
     pulses = next(iter(shot.fired.pulses.values()), ()) if shot.fired else ()
     known = {
-        "created_utc": datetime.fromtimestamp(shot.host_time_ns / 1e9, UTC).isoformat(),
+        "created_utc": read_began(path) or datetime.fromtimestamp(shot.host_time_ns / 1e9, UTC).isoformat(),
         "separation_ns": pulses[1].start_ns - pulses[0].start_ns if len(pulses) == 2 else None,
     }
     return header.model_copy(update=known)

@@ -26,6 +26,8 @@ SHOT_SCHEMA = "tomoshadow-shot"
 SCHEMA_VERSION = 1
 SHOT_VERSION = 2
 """Of shot files: in those of version 1 the later columns are missing."""
+_BEGAN = "run_created_utc"
+"""Attribute with the time of the run, as two runs may have one name; files from before have none."""
 _SEAL = "columns_crc32"
 """Attribute with the CRC-32 of all columns, those of the frames among them; files from before have none."""
 
@@ -70,6 +72,7 @@ def write_encoded_shot(path: Path, encoded: EncodedShot, header: RunHeader) -> N
     described = columns_of(header)
     with h5py.File(path, "w", libver=LIBRARY_VERSIONS) as file:
         file.attrs.update(_fixed(schema=SHOT_SCHEMA, schema_version=SHOT_VERSION, run_id=header.run_id))
+        file.attrs.update(_fixed(**{_BEGAN: header.created_utc}) if header.created_utc else {})
         create_groups(file, header, _fixed)
         for view, view_format in header.views.items():
             frames = create_frames(file, view, view_format, (1, header.frames_per_shot), _fixed)
@@ -88,6 +91,9 @@ def reading_shot(path: Path, header: RunHeader) -> Iterator[h5py.File]:
             _check_heaps(path, file)
             if (_text(file.attrs["schema"]), _text(file.attrs["run_id"])) != (SHOT_SCHEMA, header.run_id):
                 raise ForeignFile(f"{path}: not a shot of run {header.run_id}")
+            began = _text(file.attrs.get(_BEGAN, header.created_utc))
+            if header.created_utc and began != header.created_utc:
+                raise ForeignFile(f"{path}: of another run of this name, which began at {began}")
             yield file
     except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
         raise unreadable(path, error) from error
@@ -261,6 +267,12 @@ def unreadable(path: Path, error: Exception) -> ShotFileError:
     elif isinstance(error, OSError | RuntimeError):
         told = "it is torn or damaged: copy it back from a backup"
     return ShotFileError(f"{path}: cannot be read: {told}")
+
+
+def read_began(path: Path) -> str:
+    """When its run began, as a shot tells it; empty where it does not."""
+    with h5py.File(path, "r") as file:
+        return _text(file.attrs.get(_BEGAN, ""))
 
 
 def read_formats(path: Path) -> tuple[str, dict[str, ViewFormat], int]:

@@ -14,7 +14,7 @@ from daq.files.lock_file import hold_folder
 from daq.files.references_file import damaged_references
 from daq.files.run_directory import RunReader
 from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, is_shot, other_programs_see, read_shot_count, shot_path
-from daq.files.shot_file import read_formats
+from daq.files.shot_file import read_formats, reading_shot
 
 Done = Callable[[int, int], None]
 _EOF_ADDRESS = slice(28, 36)
@@ -130,13 +130,26 @@ def is_strange(run_dir: Path, header: RunHeader) -> bool:
     """Whether run.h5 is of another run than the directory and its shots."""
     if header.run_id == run_dir.name:
         return False
-    told = runs_of_shots(run_dir).values()
-    return bool(told) and header.run_id not in told
+    paths = sorted((run_dir / SHOTS_FOLDER).glob("*.h5"))
+    own = (is_own for path in paths if (is_own := _is_own(path, header)) is not None)
+    first = next(own, None)
+    return first is False and not any(islice(own, ASKED_SHOTS - 1))
 
 
 def _run_of(path: Path) -> str | None:
     try:
         return read_formats(path)[0]
+    except ShotFileError:
+        return None
+
+
+def _is_own(path: Path, header: RunHeader) -> bool | None:
+    """Whether a shot is of this run; None if it cannot be read."""
+    try:
+        with reading_shot(path, header):
+            return True
+    except ForeignFile:
+        return False
     except ShotFileError:
         return None
 

@@ -129,8 +129,14 @@ def test_what_other_programs_see_is_what_the_shots_hold(run_dir: Path, edit: Edi
     assert what in flaw.text
 
 
-def test_the_run_file_of_another_run_is_the_stranger_and_not_all_the_shots(run_dir: Path, tmp_path: Path) -> None:
-    other = header_of().model_copy(update={"run_id": "20261123T080000-other"})
+@pytest.mark.parametrize("name", ["20261123T080000-other", "same"])
+def test_the_run_file_of_another_run_is_the_stranger_and_not_all_the_shots(
+    run_dir: Path, tmp_path: Path, name: str
+) -> None:
+    if name == "same":
+        run_dir = run_dir.rename(tmp_path / "run")
+    run_id = header_of().run_id if name == "same" else name
+    other = header_of().model_copy(update={"run_id": run_id, "created_utc": "2026-11-23T08:00:00+00:00"})
     with RunWriter(tmp_path / other.run_id, other) as writer:
         writer.write_shot(shot_of(other, 0))
         writer.finish("completed")
@@ -139,9 +145,28 @@ def test_the_run_file_of_another_run_is_the_stranger_and_not_all_the_shots(run_d
     told = list(repair(run_dir))
     assert sorted(path.name for path in (run_dir / "shots").iterdir()) == ["0.h5", "1.h5"], told
     assert flaws == [(FlawKind.FOREIGN, "run.h5")]
-    assert RunReader(run_dir).header.run_id == run_dir.name
+    assert RunReader(run_dir).header.created_utc == header_of().created_utc
     assert verify(run_dir).sound
     assert any("run.h5 is set aside" in step for step in told)
+
+
+def test_a_shot_of_another_run_of_the_same_name_is_foreign(run_dir: Path, tmp_path: Path) -> None:
+    """Imports are named by their folder: two of them, of two days, may have one name."""
+    other = header_of().model_copy(update={"created_utc": "2026-11-23T08:00:00+00:00"})
+    with RunWriter(tmp_path / "other", other) as writer:
+        for index in range(2):
+            writer.write_shot(shot_of(other, index, seed=1))
+    shutil.copy(tmp_path / "other" / "shots" / "1.h5", run_dir / "shots" / "1.h5")
+    assert [(flaw.kind, flaw.file) for flaw in verify(run_dir).flaws] == [(FlawKind.FOREIGN, "shots/1.h5")]
+    with pytest.raises(ShotFileError, match=r"of another run of this name, which began at 2026-11-23T08:00:00\+00:00"):
+        RunReader(run_dir).read_shot(1)
+
+
+def test_a_lost_header_gets_the_time_of_its_run_back(run_dir: Path) -> None:
+    (run_dir / "run.h5").unlink()
+    list(repair(run_dir))
+    assert RunReader(run_dir).header.created_utc == header_of().created_utc
+    assert verify(run_dir).sound
 
 
 @pytest.mark.parametrize("damage", ["exchanged", "edited"])
