@@ -34,6 +34,14 @@ ORDER = Unchecked(
 """Of double exposures in a run that does not say where its spray comes from."""
 
 
+LENGTHS = Unchecked(
+    "whether calibration and shots were seen by the same lenses at the same focus: a factor of all lengths moves no "
+    "view, and no droplet tells it",
+    "magnification and pixels, which runs of a rig have; or --sizes: dots of known diameters, seen by the same cameras",
+)
+"""Of runs from elsewhere."""
+
+
 DEPTH = Unchecked(
     "whether all images are mirrored left to right or turned by 180 degrees, or views exchanged in pairs: sights "
     "hardly diverge in this volume, and near and far would be exchanged",
@@ -99,6 +107,7 @@ def unchecked_images(
     um_per_px: float | None = None,
     undirected: bool = False,
     stated_ns: float | None = None,
+    unscaled: bool = False,
     shallow: bool = False,
     sparse: bool = False,
 ) -> Iterator[Unchecked]:
@@ -118,6 +127,8 @@ def unchecked_images(
         They are double exposures, and nobody said where the liquid comes from.
     stated_ns : float, optional
         Separation of double exposures, where it was stated and no pulse tells it.
+    unscaled : bool
+        Nobody recorded their magnification, nor compared diameters.
     shallow : bool
         Perspective is too weak to tell near from far.
     sparse : bool
@@ -133,6 +144,8 @@ def unchecked_images(
         yield ORDER
     if stated_ns is not None:
         yield stated_separation(stated_ns)
+    if unscaled:
+        yield LENGTHS
     if shallow:
         yield DEPTH
     elif sparse:

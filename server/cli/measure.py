@@ -245,6 +245,7 @@ def _tell_unchecked(
     from daq.files.run_directory import RunReader
     from processing.analysis.near_or_far import CLOSE_PX, depth_known, depth_reversed
     from processing.calibration.calibration_file import load_calibration
+    from processing.calibration.sets.recorded_set import nominal_scales
     from processing.reconstruction.planning.calibrated_plan import default_grid
     from processing.runs.shots.turned_views import reversed_shows_px
     from processing.runs.unchecked_images import told_unchecked, unchecked_images, unknown_crop
@@ -252,6 +253,7 @@ def _tell_unchecked(
     with RunReader(run_dir) as run:
         cropped = unknown_crop(run.header)
         undirected = run.header.frames_per_shot == 2 and run.conditions.spray is None
+        unscaled = not nominal_scales(run.header.configuration) and not settings.sizes
     velocities = (shot.velocity for shot in shots if shot.velocity)
     stated_ns = next((one.separation_ns for one in velocities if one.separation_source == "stated"), None)
     calibration = load_calibration(calibration_file)
@@ -261,6 +263,7 @@ def _tell_unchecked(
         sizes_known=bool(settings.sizes),
         undirected=undirected,
         stated_ns=stated_ns,
+        unscaled=unscaled,
         shallow=reversed_shows_px(calibration, grid) < CLOSE_PX,
         sparse=not depth_known(sights) and not depth_reversed(sights),
     )

@@ -56,7 +56,8 @@ def test_droplets_of_a_run_lie_in_files_where_they_are(
         "shot", "droplets", "ghost_share", "ghost_interval", "residual_over_noise", "verdict", "cpu_s", "file"
     }  # fmt: skip
     assert (shot["shot"], shot["verdict"], result["polarity"]) == (0, "good", "bright")
-    unchecked, depth = result["not_checked"]
+    unchecked, lengths, depth = result["not_checked"]
+    assert "seen by the same lenses at the same focus" in lengths["what"]
     assert "sights hardly diverge in this volume" in depth["what"]
     assert "in proportion to light: any gamma fits bright particles" in unchecked["what"]
     assert unchecked["state"] == "gamma 1 in the settings of the cameras"
@@ -209,7 +210,7 @@ def test_shadows_of_a_run_become_droplets_with_diameters(tmp_path: Path, capsys:
     shot, arguments = shadow_run(tmp_path)
     result = told(capsys, *arguments)
     assert (result["polarity"], result["shots"][0]["verdict"]) == ("shadow", "good")
-    assert ["a gamma near to 1 fits shadows" in one["what"] for one in result["not_checked"]] == [True, False]
+    assert ["a gamma near to 1 fits shadows" in one["what"] for one in result["not_checked"]] == [True, False, False]
     stored = read_droplets(tmp_path / "out" / result["shots"][0]["file"])
     points_mm = np.column_stack([stored.columns[f"{axis}_mm"] for axis in "xyz"])
     of_found, of_truth = matches(points_mm, shot.points_mm, shot.grid.pitch_mm)
@@ -302,8 +303,10 @@ def test_droplets_in_another_scale_than_that_of_the_rig_are_doubtful(
     names = [f"view{number}" for number in range(1, 5)]
     write_bright_run(tmp_path / "run", configuration=rig_of(names, 0.22))
     write_bright_calibration(tmp_path / "calibration.json")
-    (shot,) = told(capsys, *command(tmp_path, tmp_path / "out"))["shots"]
+    result = told(capsys, *command(tmp_path, tmp_path / "out"))
+    (shot,) = result["shots"]
     assert shot["verdict"] == "doubtful"
+    assert not any("same lenses" in one["what"] for one in result["not_checked"])
     assert "29.7 px/mm by magnification and pixels of the rig: is the calibration that of another" in shot["reasons"][0]
 
 
