@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from daq.files.run_file import RUN_FILE
 from daq.frozen_model import FrozenModel
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics, hidden_share
@@ -53,7 +54,7 @@ def measured_run(results_dir: Path) -> MeasuredRun:
     if not paths:
         raise NotFound(f"{results_dir.parents[1].name} has no droplets in {results_dir.name}")
     try:
-        return _read(tuple((path, path.stat().st_mtime_ns) for path in paths))
+        return _read(tuple((path, path.stat().st_mtime_ns) for path in paths), run_changed_ns(results_dir))
     except (DropletFileError, OSError) as error:
         raise Damaged(str(error)) from error
 
@@ -70,19 +71,25 @@ def droplets_of(results_dir: Path, shot: int) -> StoredDroplets:
     """The droplets of a shot; NotFound if there are none, Damaged if they cannot be read."""
     path = droplets_file(results_dir, shot)
     try:
-        return _droplets(path, path.stat().st_mtime_ns)
+        return _droplets(path, path.stat().st_mtime_ns, run_changed_ns(results_dir))
     except (DropletFileError, OSError) as error:
         raise Damaged(str(error)) from error
 
 
+def run_changed_ns(results_dir: Path) -> int:
+    """When the header of the run around came to its place: what was read in another run does not count; 0 of none."""
+    header = results_dir.parents[1] / RUN_FILE
+    return header.stat().st_ctime_ns if header.is_file() else 0
+
+
 @lru_cache(maxsize=8)
-def _droplets(path: Path, _changed_ns: int) -> StoredDroplets:
+def _droplets(path: Path, _changed_ns: int, _run_changed_ns: int) -> StoredDroplets:
     return read_in_place(path)
 
 
 @lru_cache(maxsize=16)
-def _read(files: tuple[tuple[Path, int], ...]) -> MeasuredRun:
-    """Once per change of the files."""
+def _read(files: tuple[tuple[Path, int], ...], _run_changed_ns: int) -> MeasuredRun:
+    """Once per change of the files, or of the run around."""
     stored = [read_in_place(path) for path, _ in files]
     return MeasuredRun(
         shots=tuple(map(_told, stored)), statistics=droplet_statistics(stored), velocity=velocity_statistics(stored)

@@ -7,9 +7,10 @@ import pytest
 from daq.run.events import RunStatus
 from daq.run.state import RunState
 from processing.runs.liquid.objects import NO_OBJECTS
+from server.lab.droplets.measured import measured_run
 from server.lab.droplets.proposed_separation import proposed_separation
 from server.lab.droplets.spray_so_far import MOST_SHOTS, spray_so_far
-from server.lab.errors import NotFound
+from server.lab.errors import Damaged, NotFound
 from server.lab.runs.run_store import RunStore
 from server.rig.config import load_config
 from tests.support.droplet_run import write_run
@@ -34,6 +35,21 @@ def test_of_many_shots_an_even_sample_is_taken_and_told(tmp_path: Path) -> None:
     assert (told.liquid.ligaments, told.liquid.break_up_reason) == (0, NO_OBJECTS)
     flux = told.statistics.motion.volume_flux_mm_s.value
     assert told.statistics.motion.mass_flux_kg_m2_s.value == pytest.approx(flux)
+
+
+def test_a_run_that_was_exchanged_is_told_although_its_droplets_are_what_they_were(tmp_path: Path) -> None:
+    run_dir = write_run(tmp_path / "spray", shots=3)
+    results_dir = write_results(run_dir / "results" / "droplets-1", cone_shots(0, 3, 40), run="spray")
+    (results_dir / "settings.json").write_text("{}")
+    runs = RunStore(tmp_path, lambda: RunStatus(state=RunState.IDLE))
+    assert spray_so_far(runs, "spray").measured == 3
+    assert len(measured_run(results_dir).shots) == 3
+    other = write_run(tmp_path / "elsewhere" / "other", shots=3)
+    (other / "run.h5").replace(run_dir / "run.h5")
+    with pytest.raises(Damaged, match="holds droplets of run spray and lies in run other"):
+        spray_so_far(runs, "spray")
+    with pytest.raises(Damaged, match="holds droplets of run spray and lies in run other"):
+        measured_run(results_dir)
 
 
 def test_a_separation_is_proposed_within_what_the_cameras_of_the_rig_accept(tmp_path: Path) -> None:
