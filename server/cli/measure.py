@@ -16,6 +16,7 @@ from server.cli.runs.measured_text import droplets_summary, droplets_table
 from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, with_grid
 from server.cli.runs.resuming import resumable
 from server.cli.runs.single_view import IN_THE_IMAGE, add_single_view, measure_single_view, refuse
+from server.cli.runs.unchecked_droplets import tell_unchecked
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -221,7 +222,7 @@ def _result(
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "grid": settings.model_dump(mode="json")["grid"],
         "shots": [shot.model_dump(mode="json") for shot in shots],
-        "not_checked": _tell_unchecked(options.calibration, run_dir, settings, shots, sights_of(stored)),
+        "not_checked": tell_unchecked(options.calibration, run_dir, settings, shots, sights_of(stored)),
         "statistics": droplet_statistics(stored).model_dump(mode="json"),
         "velocity": velocity_statistics(stored).model_dump(mode="json"),
         **liquid_summary(stored).model_dump(mode="json"),
@@ -233,41 +234,6 @@ def _told(doubts: tuple[str, ...]) -> list[str]:
     for doubt in doubts:
         progress(doubt)
     return list(doubts)
-
-
-def _tell_unchecked(
-    calibration_file: Path,
-    run_dir: Path,
-    settings: "MeasureSettings",
-    shots: "list[ShotDroplets]",
-    sights: dict[str, int],
-) -> list[dict[str, str]]:
-    from daq.files.run_directory import RunReader
-    from processing.analysis.near_or_far import CLOSE_PX, depth_known, depth_reversed
-    from processing.calibration.calibration_file import load_calibration
-    from processing.calibration.sets.recorded_set import nominal_scales
-    from processing.reconstruction.planning.calibrated_plan import default_grid
-    from processing.runs.shots.turned_views import reversed_shows_px
-    from processing.runs.unchecked_images import told_unchecked, unchecked_images, unknown_crop
-
-    with RunReader(run_dir) as run:
-        cropped = unknown_crop(run.header)
-        undirected = run.header.frames_per_shot == 2 and run.conditions.spray is None
-        unscaled = not nominal_scales(run.header.configuration) and not settings.sizes
-    velocities = (shot.velocity for shot in shots if shot.velocity)
-    stated_ns = next((one.separation_ns for one in velocities if one.separation_source == "stated"), None)
-    calibration = load_calibration(calibration_file)
-    grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
-    unchecked = unchecked_images(
-        settings.polarity,
-        sizes_known=bool(settings.sizes),
-        undirected=undirected,
-        stated_ns=stated_ns,
-        unscaled=unscaled,
-        shallow=reversed_shows_px(calibration, grid) < CLOSE_PX,
-        sparse=not depth_known(sights) and not depth_reversed(sights),
-    )
-    return told_unchecked([*unchecked, *cropped], progress)
 
 
 def _here(

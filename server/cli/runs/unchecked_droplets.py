@@ -1,0 +1,46 @@
+"""What nothing checks in the measured droplets of a run, for people and programs."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from server.cli.output import progress
+
+if TYPE_CHECKING:
+    from processing.runs.droplets.measure_settings import MeasureSettings
+    from processing.runs.droplets.measured_shot import ShotDroplets
+
+
+def tell_unchecked(
+    calibration_file: Path,
+    run_dir: Path,
+    settings: "MeasureSettings",
+    shots: "list[ShotDroplets]",
+    sights: dict[str, int],
+) -> list[dict[str, str]]:
+    """Tell what nothing checks in the droplets of a run, and what to state so that it is; once for all its shots."""
+    from daq.files.run_directory import RunReader
+    from processing.analysis.near_or_far import CLOSE_PX, depth_known, depth_reversed
+    from processing.calibration.calibration_file import load_calibration
+    from processing.calibration.sets.recorded_set import nominal_scales
+    from processing.reconstruction.planning.calibrated_plan import default_grid
+    from processing.runs.shots.turned_views import reversed_shows_px
+    from processing.runs.unchecked_images import told_unchecked, unchecked_images, unknown_crop
+
+    with RunReader(run_dir) as run:
+        cropped = unknown_crop(run.header)
+        undirected = run.header.frames_per_shot == 2 and run.conditions.spray is None
+        unscaled = not nominal_scales(run.header.configuration) and not settings.sizes
+    velocities = (shot.velocity for shot in shots if shot.velocity)
+    stated_ns = next((one.separation_ns for one in velocities if one.separation_source == "stated"), None)
+    calibration = load_calibration(calibration_file)
+    grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
+    unchecked = unchecked_images(
+        settings.polarity,
+        sizes_known=bool(settings.sizes),
+        undirected=undirected,
+        stated_ns=stated_ns,
+        unscaled=unscaled,
+        shallow=reversed_shows_px(calibration, grid) < CLOSE_PX,
+        sparse=not depth_known(sights) and not depth_reversed(sights),
+    )
+    return told_unchecked([*unchecked, *cropped], progress)
