@@ -3,11 +3,12 @@
 import logging
 from dataclasses import replace
 from threading import Lock, Thread
+from time import monotonic_ns
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from daq.devices import DeviceIdentity
-from daq.drivers.camera_profile import CameraProfile, FeatureWrite
+from daq.drivers.camera_profile import CameraProfile
 from daq.drivers.exposure_pairing import ExposureFormat, double_frame
 from daq.drivers.frame_receiver import FrameReceiver, StreamCounters
 from daq.drivers.gige_question import Controller, controller_of
@@ -24,6 +25,8 @@ _log = logging.getLogger(__name__)
 ARAVIS_REMEDY = "apt install python3-gi gir1.2-aravis-0.8, and a virtual environment with --system-site-packages"
 """No package index has them, so Debian's must be seen."""
 _RELEASE_LIMIT_S = 2.0
+_CLOCK_LAG_NS = 50_000_000
+"""By more, between two shots, no clock is slow: it was set back."""
 
 
 def load_aravis(name: str) -> "type[AravisDevice]":
@@ -74,6 +77,7 @@ class AravisCamera:
         self._receiver: FrameReceiver | None = None
         self._controller: Controller | None = None
         self._last_id: int | None = None
+        self._opened_ns: tuple[int, int] | None = None
         self._late_frames = 0
         self._letting_go = Lock()
         self._opening = Lock()
@@ -178,13 +182,14 @@ class AravisCamera:
         """
         self.disarm()
         device = self._connected()
-        settings = self._settings(device)
+        settings = self._profile.writes(self._form.shape, device.has)
         for setting in settings:
             device.write(setting)
         device.set_packets(self._network.packet_bytes, self._network.packet_delay_ns)
         receiver = FrameReceiver(self._name, device.open_stream(self._form, self._network.socket_buffer_bytes))
         receiver.start()
         self._receiver = receiver
+        self._opened_ns = None
         self._last_id, self._late_frames = None, 0  # not every camera counts from 1: a lone first frame proves nothing
         try:
             device.start()
@@ -195,9 +200,21 @@ class AravisCamera:
             raise
 
     def begin_shot(self) -> None:
-        """Re-base: only frames that the camera stamps later than now belong to the next firing."""
-        receiver = self._armed()
-        receiver.open_shot(self._connected().clock_ns())
+        """Re-base: only frames that the camera stamps later than now belong to the next firing.
+
+        If its clock went back while frames of the last firing are on their way, a fresh acquisition tells them apart.
+        """
+        self._armed()
+        clock_ns = self._connected().clock_ns()
+        if self._last_id is None and self._went_back(clock_ns):
+            self.arm()
+            clock_ns = self._connected().clock_ns()
+        self._armed().open_shot(clock_ns)
+        self._opened_ns = monotonic_ns(), clock_ns
+
+    def _went_back(self, clock_ns: int) -> bool:
+        then_ns, told_ns = self._opened_ns or (monotonic_ns(), clock_ns)
+        return clock_ns - told_ns < monotonic_ns() - then_ns - _CLOCK_LAG_NS
 
     def collect(self, deadline_s: float) -> DoubleFrame:
         """Exposures A and B of the firing since ``begin_shot``.
@@ -231,18 +248,6 @@ class AravisCamera:
         receiver = self._receiver
         if receiver is not None:
             self._release(keep=True)
-
-    def _settings(self, device: "AravisDevice") -> list[FeatureWrite]:
-        rows, columns = self._form.shape
-        offsets = [FeatureWrite(feature=name, value=0) for name in ("OffsetX", "OffsetY") if device.has(name)]
-        image = [
-            FeatureWrite(feature="Width", value=columns),
-            FeatureWrite(feature="Height", value=rows),
-            FeatureWrite(feature="PixelFormat", value=self._profile.pixel_format),
-        ]
-        named = {setting.feature for setting in self._profile.features}
-        ours = [setting for setting in (*offsets, *image) if setting.feature not in named]
-        return [*ours, *self._profile.features]
 
     def _connected(self) -> "AravisDevice":
         with self._opening:

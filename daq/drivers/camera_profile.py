@@ -5,6 +5,7 @@ are written. So a profile is an ordered list of writes, each of which is read ba
 """
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -69,6 +70,18 @@ class CameraProfile(FrozenModel):
         if self.stacked and (self.frames_per_trigger != 2 or self.pair is not None):
             raise ValueError("stacked exposures are two per trigger, and one image has one stamp: leave out pair")
         return self
+
+    def writes(self, shape: tuple[int, int], has: Callable[[str], bool]) -> list[FeatureWrite]:
+        """All that a camera is told: size (rows, columns) and format unless it says otherwise, then what it says."""
+        rows, columns = shape
+        offsets = [FeatureWrite(feature=name, value=0) for name in ("OffsetX", "OffsetY") if has(name)]
+        image = [
+            FeatureWrite(feature="Width", value=columns),
+            FeatureWrite(feature="Height", value=rows),
+            FeatureWrite(feature="PixelFormat", value=self.pixel_format),
+        ]
+        named = {setting.feature for setting in self.features}
+        return [*(setting for setting in (*offsets, *image) if setting.feature not in named), *self.features]
 
     @property
     def bits(self) -> int:

@@ -42,10 +42,11 @@ _DROPS: dict[Literal["A", "B"], ShotFault] = {"A": "dropped_a", "B": "dropped_b"
 
 @dataclass(frozen=True)
 class _Firing:
-    """A pulse train whose trigger edge the camera took, its zero in host time, and the acquisition it belongs to."""
+    """A pulse train whose trigger edge the camera took, its zero by host and camera, and the acquisition it is of."""
 
     train: FiredTrain
     zero_ns: int
+    stamp_ns: int
     acquisition: int
 
 
@@ -178,7 +179,7 @@ class SimulatedCamera:
                 self._lost_triggers += 1
                 return
             self._busy_until_ns = zero_ns + delay_ns + self._timing.cycle_ns
-            self._pending.append(_Firing(train, zero_ns, self._acquisition))
+            self._pending.append(_Firing(train, zero_ns, self._device_ns(zero_ns), self._acquisition))
             self._changed.notify_all()
 
     def _accepts_trigger(self, edge_ns: int) -> bool:
@@ -273,7 +274,7 @@ class SimulatedCamera:
         pixel_format = self._bank.pixel_format
         block = Block(
             block_id=block_id,
-            timestamp_ns=self._device_ns(firing.zero_ns + exposure.window.open_ns),
+            timestamp_ns=firing.stamp_ns + exposure.window.open_ns,
             pixel_format=pixel_format,
             shape=(image.shape[0], image.shape[1]),
             payload=pixel_format.encode(image),

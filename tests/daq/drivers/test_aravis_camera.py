@@ -181,6 +181,17 @@ def test_a_lone_exposure_after_an_incomplete_shot_is_not_guessed(wire: Wire) -> 
     wire.assert_good_shot()
 
 
+def test_late_frames_enter_no_later_shot_though_the_clock_went_back(wire: Wire) -> None:
+    sleep(0.5)
+    wire.assert_good_shot()
+    wire.simulated.faults.late, wire.simulated.faults.late_s = 1, 0.6
+    assert not wire.shoot(0.3)[1].valid
+    wire.simulated.faults.timestamp_jump_ns, wire.simulated.faults.missed_triggers = -1_000_000_000, 1
+    _, shot = wire.shoot(0.5)
+    assert [record.valid for record in (shot.record_a, shot.record_b)] == [False, False]
+    wire.assert_good_shot()
+
+
 def test_a_missed_trigger_shifts_nothing(wire: Wire) -> None:
     wire.assert_good_shot()
     wire.simulated.faults.missed_triggers = 1
