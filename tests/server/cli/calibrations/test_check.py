@@ -115,7 +115,7 @@ def test_images_of_another_size_than_those_of_the_target_are_refused(
     save_calibration(calibration_of(views()[:3]), calibration_file)
     more = [] if command == "check" else [GRID, "-o", tmp_path / "out"]
     complaint = refused(capsys, command, run_dir, "--calibration", calibration_file, *more)
-    assert "view1: image of 160 x 120 px, calibrated for (400, 300)" in complaint
+    assert "view1: image of 160 x 120 px, calibrated for 400 x 300 px" in complaint
 
 
 def test_droplets_are_part_of_the_verdict_of_a_calibration(
