@@ -134,7 +134,8 @@ def read_closing(run_dir: Path) -> RunClosing | None:
 def other_programs_see(run_dir: Path, header: RunHeader) -> Iterator[str]:
     """What a reader of HDF5 sees in ``run.h5`` that is not what the shots hold, or not what was written of the run."""
     with reading(run_dir) as file:
-        texts = [item for group in ("", "user", "sample") for item in file[f"entry/{group}"].values() if _is_text(item)]
+        groups = [file[path] for path in ("entry", "entry/user", "entry/sample") if path in file]  # old runs lack two
+        texts = [item for group in groups for item in group.values() if _is_text(item)]
         for text in texts:
             try:
                 _read_text(text.parent, text.name.rpartition("/")[2])

@@ -12,6 +12,7 @@ import pytest
 
 from daq.drivers.camera_profile import load_camera_profile
 from daq.files.run_directory import RunReader, list_runs
+from daq.files.verification import FlawKind, verify
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.volume_file import read_volume
 from processing.runs.manifest.importing import import_manifest
@@ -89,6 +90,12 @@ def test_a_run_without_an_outcome_is_still_an_interrupted_one(old: Path) -> None
     assert interrupted
     open_runs = [run_dir.name for run_dir in list_runs(old / "runs") if RunReader(run_dir).outcome is None]
     assert open_runs == interrupted
+
+
+def test_whole_runs_are_verified_as_such(old: Path) -> None:
+    for path, expected in expected_of(old, "run").items():
+        flaws = {flaw.kind for flaw in verify(old / path).flaws}
+        assert flaws == (set() if expected["outcome"] else {FlawKind.NO_OUTCOME}), path
 
 
 def test_packed_runs_open(old: Path) -> None:
