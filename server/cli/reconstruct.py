@@ -150,9 +150,8 @@ def _reconstruct_shots(
     made = {volume.file for shot in shots for volume in shot.volumes}
     others = [file for file in volume_files(out) if file.name not in made][-MOST_COMPARED:]
     meetings = stored_meetings(others) | {key: one for shot in shots for key, one in shot.meetings.items()}
-    told = [_with_pale(shot, pale_views(meetings)) for shot in shots]
-    seldom = [shot for shot in seldom_meeting(meetings) if shot in indices]
-    return told, ask_seldom(belonging(), seldom, run_dir, calibration)
+    pale, seldom = pale_views(meetings), [shot for shot in seldom_meeting(meetings) if shot in indices]
+    return [_with_pale(shot, pale) for shot in shots], ask_seldom(belonging(), seldom, run_dir, calibration)
 
 
 def _elsewhere(

@@ -46,7 +46,7 @@ export default {
             <div class="live-focus" title="Steepest edges: change of the grey value per pixel, in percent of the light. Higher is sharper; the line shows how it went">
               <svg viewBox="0 0 80 20" preserveAspectRatio="none" role="img" :aria-label="view + ' focus trend'"><path :d="shown[number].trend" /></svg>
               <span>{{ shown[number].focus }}</span>
-              </div>
+            </div>
           </div>
         </figure>
       </div>
