@@ -12,7 +12,7 @@ from processing.analysis.shot_doubts import COMPONENTS
 from processing.analysis.velocity.common_motion import Indices
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import pair
-from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
+from processing.analysis.velocity.velocity_verdict import FASTEST_M_S, MOST_STILL, STILL
 from processing.geometry import FloatArray
 
 MOST_APART = 1.5
@@ -21,13 +21,12 @@ LEAST_LINKED, FEWEST = 0.1, 10
 """Share of the droplets of a shot that are on tracks, and of those that are on tracks from a shot to the next one; of
 fewer droplets than so many nothing is said."""
 MOST_LISTED = 5
-STILL, MOST_STILL = 2.0, 0.5
-"""Standard deviations of the velocity below which nothing is known to move, and share of the droplets."""
 VARIANCES = ("cov_uu_m2_s2", "cov_vv_m2_s2", "cov_ww_m2_s2")
 TOGETHER = 0.5
 """Amount of the mean velocity over the mean speed, from which on droplets have a direction."""
-LEAST_JUMP, SURE = 0.15, 5.0
-"""Share of its way by which a median droplet is farther at once, and standard deviations by which that is known."""
+LEAST_JUMP, LEAST_JUMP_VOXEL, SURE = 0.15, 0.2, 5.0
+"""Share of its way by which a median droplet is farther at once, the least of it, as rigs shake by some hundredths of a
+voxel, and standard deviations by which it is known."""
 THIN = 0.5
 """Share of the droplets of a shot that tracks link to the next one, below which they are paired anew."""
 TINY = 1e-12
@@ -123,7 +122,7 @@ def uneven_doubts(frames: Sequence[MovingDroplets], ids: Sequence[Indices], firs
         return
     numbers, changes, sds, ways = (np.array(column) for column in zip(*known, strict=True))
     jumps, way = np.abs(changes - np.median(changes)), float(np.median(ways))
-    odd = (jumps > SURE * sds) & (jumps > LEAST_JUMP * way)
+    odd = (jumps > SURE * sds) & (jumps > max(LEAST_JUMP * way, LEAST_JUMP_VOXEL))
     if odd.any():
         where = f"{np.count_nonzero(odd)} of {len(frames)} shots (shot {_listed(numbers[odd])})"
         yield (

@@ -18,7 +18,7 @@ FASTEST_M_S = 1000.0
 LEAST_NOISE = 0.1
 """Of the noise of displacements. An image that is there twice has none."""
 STILL, MOST_STILL = 2.0, 0.5
-"""Standard deviations of the displacement below which nothing is known to move, and share of the droplets."""
+"""Standard deviations of displacement or velocity below which nothing is known to move, and share of the droplets."""
 Verdict = tuple[ShotVerdict, tuple[str, ...]]
 
 

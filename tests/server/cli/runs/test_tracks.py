@@ -203,6 +203,16 @@ def test_shots_at_uneven_times_are_told(
     assert told_of is None or told_of in uneven[0]
 
 
+def test_a_rig_that_shakes_a_little_does_not_make_slow_droplets_fast(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shaken_voxel = np.random.default_rng(1).normal(0, 0.025, 20)
+    slow = series(density_per_mm3=8, frames=20, step=(0.3, 0.1, 0.1), scatter=0.003, turn=0.0, gradient=0.0003)
+    frames = [replace(one, places=one.places + by) for one, by in zip(slow.frames, shaken_voxel[:, None], strict=True)]
+    results = write_series(tmp_path / "droplets", replace(slow, frames=frames), rate_hz=RATE_HZ)
+    assert told(capsys, "tracks", results, "-o", tmp_path / "tracks.h5")["doubts"] == []
+
+
 def test_shots_that_are_not_good_are_told_with_their_tracks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = {"a": {"verdict": "doubtful", "reasons": ["it is blurred"]}, "b": {"verdict": "refused", "reasons": []}}
     results = write_series(tmp_path / "droplets", series(frames=4), rate_hz=RATE_HZ, exposures=json.dumps(said))
