@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Mapping
 
     from processing.reconstruction.settings import ReconstructionSettings
-    from processing.runs.shots.meetings import Exposure
+    from processing.runs.shots.meetings import ExposureKey
     from processing.runs.shots.shot_result import ShotResult
 
 NAME = "reconstruct"
@@ -178,7 +178,7 @@ def _tell_slow_views(shot: "ShotResult") -> None:
             progress(f"{name} takes the exact way, which is slower ({nodes}): {view.reason}")
 
 
-def _with_pale(shot: "ShotResult", pale: "Mapping[Exposure, Mapping[str, str]]") -> "ShotResult":
+def _with_pale(shot: "ShotResult", pale: "Mapping[ExposureKey, Mapping[str, str]]") -> "ShotResult":
     """The same shot, with what the others say of its views, which is told."""
     volumes = []
     for volume in shot.volumes:

@@ -17,7 +17,7 @@ from pydantic import Field
 from daq.frozen_model import FrozenModel
 from processing.analysis.near_or_far import SIGHTS, added, doubts_of
 from processing.calibration.verdict import Verdict
-from processing.runs.shots.meetings import Exposure, Meeting, meetings_of, pale_views, seldom_meeting
+from processing.runs.shots.meetings import ExposureKey, Meeting, meetings_of, pale_views, seldom_meeting
 from processing.runs.shots.shot_check import ALARM_PX, STOP_PX
 from processing.runs.workbench import Latest
 from server.lab.events import EventPublisher
@@ -123,7 +123,7 @@ class CalibrationWatch:
         self._events = events
         self._lock = threading.Lock()
         self._accounts: dict[Pair, _Account] = {}
-        self._meetings: Latest[dict[Exposure, Meeting]] = Latest(_RESULTS_COMPARED)
+        self._meetings: Latest[dict[ExposureKey, Meeting]] = Latest(_RESULTS_COMPARED)
         self.standing: CalibrationStanding | None = None
         """Of the run that was checked last."""
 

@@ -45,20 +45,20 @@ class Meeting(FrozenValue):
     errors: Annotated[Mapping[str, float], Field(description="standard deviations of these by chance")] = {}
 
 
-Exposure = tuple[int, FrameName]
+ExposureKey = tuple[int, FrameName]
 """Shot and exposure."""
-Meetings = Mapping[Exposure, Meeting]
+Meetings = Mapping[ExposureKey, Meeting]
 
 
-def meetings_of(volumes: list[dict[str, Any]]) -> dict[Exposure, Meeting]:
+def meetings_of(volumes: list[dict[str, Any]]) -> dict[ExposureKey, Meeting]:
     """Of records of volumes, those that have one."""
     told = [one for one in volumes if one.get("meeting")]
     return {(one["shot"], one["frame"]): Meeting.model_validate(one["meeting"]) for one in told}
 
 
-def stored_meetings(volume_files: Iterable[Path]) -> dict[Exposure, Meeting]:
+def stored_meetings(volume_files: Iterable[Path]) -> dict[ExposureKey, Meeting]:
     """What the exposures of stored volumes are compared by; of older ones, and what nobody can read, nothing."""
-    found: dict[Exposure, Meeting] = {}
+    found: dict[ExposureKey, Meeting] = {}
     for file in volume_files:
         with suppress(VolumeFileError, ValueError, KeyError), open_volume(file) as volume:
             told = volume.provenance
@@ -81,9 +81,9 @@ def seldom_meeting(meetings: Meetings) -> list[int]:
     return sorted(odd, key=counts.__getitem__)[:MOST_ODD]
 
 
-def pale_views(meetings: Meetings) -> dict[Exposure, dict[str, str]]:
+def pale_views(meetings: Meetings) -> dict[ExposureKey, dict[str, str]]:
     """What is said of views that show droplets much paler, beside the other views, than in most exposures of a run."""
-    said: dict[Exposure, dict[str, str]] = {}
+    said: dict[ExposureKey, dict[str, str]] = {}
     for frame in dict.fromkeys(frame for _, frame in meetings):
         told = {key: one for key, one in meetings.items() if key[1] == frame and one.droplets >= FEWEST}
         if len(told) < FEWEST_EXPOSURES:
@@ -106,7 +106,7 @@ def with_odd(faults: Sequence[Mapping[str, Any]], meetings: Meetings) -> list[Ma
     return [*known, *({"shot": shot, "odd_light": pale[shot]} for shot in sorted(others))]
 
 
-def _pale(told: Meetings, view: str) -> dict[Exposure, str]:
+def _pale(told: Meetings, view: str) -> dict[ExposureKey, str]:
     droplets = np.array([one.droplets for one in told.values()])
     contrasts = np.array([one.contrasts[view] for one in told.values()])
     usual = float(np.median(contrasts))

@@ -6,7 +6,7 @@ from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.planned_view import PlannedView
 from processing.reconstruction.settings import FrozenValue, GridSettings
 from processing.runs.results_file import FrameName
-from processing.runs.shots.meetings import Exposure, Meeting
+from processing.runs.shots.meetings import ExposureKey, Meeting
 
 
 class VolumeRecord(FrozenValue):
@@ -45,6 +45,6 @@ class ShotResult(FrozenValue):
     peak_rss_mb: float
 
     @property
-    def meetings(self) -> dict[Exposure, Meeting]:
+    def meetings(self) -> dict[ExposureKey, Meeting]:
         """Of its exposures, those that have one."""
         return {(one.shot, one.frame): one.meeting for one in self.volumes if one.meeting}

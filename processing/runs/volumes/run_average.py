@@ -18,7 +18,7 @@ from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.exposure_faults import copied, exposure_faults
 from processing.runs.results_file import FrameName
 from processing.runs.shots.meeting_lines import MeetingLines
-from processing.runs.shots.meetings import Exposure, Meeting, seldom_meeting, with_odd
+from processing.runs.shots.meetings import ExposureKey, Meeting, seldom_meeting, with_odd
 from processing.runs.shots.shot_images import require_match, shot_intensities
 from processing.runs.workbench import References, Workbench
 from processing.volume import VoxelGrid
@@ -94,7 +94,7 @@ def average_run(
         calibration.require_usable(run.header.views)
         plan = plan_of(calibration, settings, tuple(run.header.views))
         faults: list[Mapping[str, Any]] = []
-        lines, meetings = MeetingLines.of(calibration, tuple(run.header.views)), dict[Exposure, Meeting]()
+        lines, meetings = MeetingLines.of(calibration, tuple(run.header.views)), dict[ExposureKey, Meeting]()
         references = bench.references(run)
         exposures = _exposures(run, shots, frame, calibration, settings, references, done, threads, faults)
         if lines:
@@ -111,7 +111,7 @@ def _looked_at(
     shots: Sequence[int],
     frame: FrameName,
     lines: MeetingLines,
-    meetings: dict[Exposure, Meeting],
+    meetings: dict[ExposureKey, Meeting],
 ) -> Exposures:
     """The same exposures, each asked whether lines of sight meet in it."""
     for index, images in zip(shots, exposures, strict=True):

@@ -10,7 +10,7 @@ import pytest
 
 from processing.calibration.calibration_file import save_calibration
 from processing.reconstruction.volume_file import read_volume
-from processing.runs.shots.meetings import Exposure, Meeting, pale_views, seldom_meeting
+from processing.runs.shots.meetings import ExposureKey, Meeting, pale_views, seldom_meeting
 from processing.synthetic.stamping import FloatImage
 from server.cli.main import main
 from tests.support.command_line import told
@@ -112,7 +112,7 @@ def test_a_view_that_is_pale_for_one_shot_is_told(
 
 def test_contrasts_that_scatter_or_are_few_make_no_view_pale() -> None:
     def said(contrasts: Sequence[float], droplets: int = 40, error: float = 0.01) -> list[int]:
-        meetings: dict[Exposure, Meeting] = {
+        meetings: dict[ExposureKey, Meeting] = {
             (shot, "a"): Meeting(droplets=droplets, contrasts={"view1": one}, errors={"view1": error})
             for shot, one in enumerate(contrasts)
         }
