@@ -1,7 +1,6 @@
 """CalibrationStory: what a calibration file says, in the words of somebody who has to decide about it."""
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Annotated, Any
 
@@ -10,8 +9,6 @@ from pydantic import Field, ValidationError
 from daq.frozen_model import FrozenModel
 from processing.calibration.verdict import Verdict
 from server.lab.errors import Damaged
-from server.lab.jobs import Job, JobKind
-from server.lab.results import result_calibration
 from server.lab.services import Context
 
 _STANDS_OUT = 2.0
@@ -143,20 +140,3 @@ def _plane(stored: Mapping[str, Any]) -> PlaneFigures:
     z_mm = stored.get("z_mm")
     figures = {name: stored.get(name) for name in PlaneFigures.model_fields}
     return PlaneFigures.model_validate({**figures, "name": stored["name"] if z_mm is None else f"z = {z_mm:.3f} mm"})
-
-
-def replaced_since(context: Context, jobs: Sequence[Job]) -> set[str]:
-    """Ids of jobs of which the file that has the name of their calibration now is another one."""
-    now = {name: context.calibrations.content_id(name) for name in {job.calibration for job in jobs}}
-    of_results = cache(lambda run_id, name: result_calibration(context.services.data_dir / run_id, name))
-    made_by = {job.id: _content_of(job, of_results) for job in jobs}
-    return {job.id for job in jobs if now[job.calibration] and made_by[job.id] not in (None, "", now[job.calibration])}
-
-
-def _content_of(job: Job, of_results: Callable[[str, str], str | None]) -> str | None:
-    """Hash of the calibration that a job has made or used; None or empty where nobody knows it, or not yet."""
-    if job.kind is JobKind.CALIBRATION:
-        return (job.result or {}).get("calibration")
-    if job.kind is JobKind.CHECK or job.results_id is None:
-        return job.settings.get("content")
-    return of_results(job.run_id, job.results_id)

@@ -6,7 +6,7 @@ from daq.run_plan import ImageKey
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.droplets.measure_settings import MeasureSettings
 from server.lab.errors import Unprocessable
-from server.lab.jobs import Job, reconstruction_job
+from server.lab.jobs.job import Job, reconstruction_job
 from server.lab.results import result_calibration
 from server.lab.services import Context
 

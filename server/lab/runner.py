@@ -19,7 +19,8 @@ from server.lab.duty import Duty, pause
 from server.lab.engine.task import Engine, Task, TaskAborted, TaskError, Unavailable
 from server.lab.errors import Conflict, told
 from server.lab.events import EventPublisher
-from server.lab.jobs import Job, JobKind, JobState, JobTable
+from server.lab.jobs.job import Job, JobKind, JobState
+from server.lab.jobs.job_table import JobTable
 from server.lab.results import is_kept, remaking
 from server.lab.watch import CalibrationWatch
 

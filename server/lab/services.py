@@ -21,7 +21,8 @@ from server.lab.desk.once import Once
 from server.lab.duty import Duty, Lamp
 from server.lab.engine.task import Engine, Task
 from server.lab.events import EventPublisher
-from server.lab.jobs import JobKind, JobTable
+from server.lab.jobs.job import JobKind
+from server.lab.jobs.job_table import JobTable
 from server.lab.live_view.live_feed import LiveFeed
 from server.lab.live_view.live_volume import LiveVolume
 from server.lab.monitor import PERIOD_S, RigMonitor

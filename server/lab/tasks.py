@@ -22,7 +22,7 @@ from processing.runs.run_check import check_shot
 from processing.runs.volumes.pipeline import Keep, reconstruct_shot
 from processing.runs.workbench import Workbench
 from server.lab.engine.task import Task
-from server.lab.jobs import JobKind
+from server.lab.jobs.job import JobKind
 from server.lab.results import keep_preview, keep_volume
 
 _KEEPS: Mapping[str, Keep] = {"preview": keep_preview, "volume": keep_volume, "volume alone": write_slabs}

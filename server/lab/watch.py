@@ -21,7 +21,7 @@ from processing.runs.shots.meetings import ExposureKey, Meeting, meetings_of, pa
 from processing.runs.shots.shot_check import ALARM_PX, STOP_PX
 from processing.runs.workbench import Latest
 from server.lab.events import EventPublisher
-from server.lab.jobs import ENDED, Job, JobKind, JobState, check_job
+from server.lab.jobs.job import ENDED, Job, JobKind, JobState, check_job
 
 _TRUSTING = (JobKind.RECONSTRUCTION, JobKind.MEASUREMENT)
 """Jobs that make nothing good of a calibration that does not fit."""

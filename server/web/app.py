@@ -24,8 +24,8 @@ from server.lab.desk.desk_watch import DeskWatch
 from server.lab.desk.once import Once
 from server.lab.desk.request_table import REQUESTS_FILE, opened_requests
 from server.lab.duty import Duty, Work
-from server.lab.job_recovery import opened_table
-from server.lab.jobs import JobTable
+from server.lab.jobs.job_recovery import opened_table
+from server.lab.jobs.job_table import JobTable
 from server.lab.live_view.live_feed import LiveFeed
 from server.lab.live_view.live_volume import LiveVolume
 from server.lab.monitor import RigMonitor

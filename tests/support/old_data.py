@@ -27,7 +27,7 @@ from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.reconstruction.volume_file import open_volume
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray
 from server.lab.calibrations import CalibrationStore
-from server.lab.jobs import JobTable
+from server.lab.jobs.job_table import JobTable
 from server.lab.results import result_sets
 from server.lab.runs.run_store import RunStore
 from server.pictures.previews import load_preview

@@ -21,7 +21,7 @@ from server.lab.calibrations import CalibrationStore
 from server.lab.engine.inline_engine import InlineEngine
 from server.lab.engine.task import Engine
 from server.lab.events import EventPublisher
-from server.lab.jobs import JobKind
+from server.lab.jobs.job import JobKind
 from server.lab.services import Services
 from server.pictures.previews import make_preview, preview_path, save_preview
 from server.web.abort_listener import AbortListener

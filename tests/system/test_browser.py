@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 from daq.run.events import ShotRecorded
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import save_calibration
-from server.lab.jobs import JobKind
+from server.lab.jobs.job import JobKind
 from server.lab.services import Services
 from server.lab.tasks import check_run
 from server.web.app import create_app

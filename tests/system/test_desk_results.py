@@ -13,7 +13,7 @@ from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.runs.volumes.pipeline import reconstruct_shots
 from processing.volume import VoxelGrid
-from server.lab.jobs import reconstruction_job
+from server.lab.jobs.job import reconstruction_job
 from server.lab.results import keep_preview
 from tests.server.web.test_api import wait_for_jobs
 from tests.support.desk import PICTURES, PULSE, choose_calibration, without_keys

@@ -20,8 +20,9 @@ from processing.runs.results_file import volume_path
 from processing.runs.shots.shot_result import ShotResult
 from processing.runs.volumes.pipeline import reconstruct_shot
 from server.lab.events import EventPublisher
-from server.lab.job_recovery import jobs_on_disk
-from server.lab.jobs import Job, JobKind, JobState, JobTable
+from server.lab.jobs.job import Job, JobKind, JobState
+from server.lab.jobs.job_recovery import jobs_on_disk
+from server.lab.jobs.job_table import JobTable
 from server.lab.watch import CalibrationWatch
 from server.rig.config import load_config
 from server.web.ui.draft import DraftStore, first_draft, plan_of

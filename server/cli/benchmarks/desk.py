@@ -23,7 +23,7 @@ from server.cli.benchmarks import busy_server
 from server.cli.benchmarks.bench_rig import NoRig, rig_in
 from server.cli.benchmarks.browsed import TIMES, browsed
 from server.cli.benchmarks.served import Server, calibrated, served, start
-from server.lab.jobs import JobState
+from server.lab.jobs.job import JobState
 from server.pictures.previews import AXES
 from server.rig.config import load_config
 

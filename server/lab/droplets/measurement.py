@@ -10,7 +10,7 @@ from processing.runs.measured_images import require_backgrounds
 from processing.runs.stated_grid import parse_grid
 from processing.runs.workbench import read_references
 from server.lab.errors import Unprocessable
-from server.lab.jobs import Job, JobKind, shot_job
+from server.lab.jobs.job import Job, JobKind, shot_job
 from server.lab.reconstruction import ends_of, requested_shots, results_id_of
 from server.lab.services import Context
 

@@ -11,7 +11,8 @@ from daq.files.lock_file import hold_folder
 from daq.files.storage import storing
 from daq.frozen_model import FrozenModel
 from server.lab.errors import Conflict, Unprocessable
-from server.lab.jobs import JobState, JobTable
+from server.lab.jobs.job import JobState
+from server.lab.jobs.job_table import JobTable
 from server.lab.runs.run_store import RunStore
 from server.lab.runs.unkept_runs import UnkeptRuns
 

@@ -15,7 +15,8 @@ from daq.files.atomic_file import replacing
 from daq.files.run_directory import RunReader
 from daq.files.storage import storing
 from daq.names import is_identifier
-from server.lab.jobs import JobState, JobTable
+from server.lab.jobs.job import JobState
+from server.lab.jobs.job_table import JobTable
 
 UNKEPT_FILE = "unkept_runs"
 

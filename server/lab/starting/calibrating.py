@@ -6,7 +6,7 @@ from daq.run_plan import RunKind
 from server.lab.calibration_story import refusals_of_use
 from server.lab.desk.visitor import Visitor
 from server.lab.errors import Unprocessable
-from server.lab.jobs import Job, calibration_job
+from server.lab.jobs.job import Job, calibration_job
 from server.lab.services import Context
 from server.lab.starting.command import command, tell_deed
 

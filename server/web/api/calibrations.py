@@ -12,7 +12,7 @@ from server.lab.calibration_story import CalibrationStory, story_of
 from server.lab.calibrations import CalibrationSummary
 from server.lab.desk.once import described
 from server.lab.errors import NotFound
-from server.lab.jobs import Job
+from server.lab.jobs.job import Job
 from server.lab.starting.calibrating import CameraModel, request_calibration, use_calibration
 from server.web.api.parameters import CalibrationId, ContextOf, IdempotencyKey, Who
 from server.web.opened_file import OpenedFile, opened_file

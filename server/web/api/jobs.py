@@ -13,7 +13,7 @@ from processing.runs.droplets.measure_settings import MeasureSettings
 from server.lab.desk.once import described
 from server.lab.desk.visitor import Visitor
 from server.lab.droplets.measurement import request_measurement
-from server.lab.jobs import Job, JobKind, JobState
+from server.lab.jobs.job import Job, JobKind, JobState
 from server.lab.reconstruction import request_reconstruction
 from server.lab.services import Context
 from server.lab.starting.command import tell_deed

@@ -8,7 +8,7 @@ from nicegui import ui
 
 from daq.errors import DaqError
 from server.lab.errors import ServerError
-from server.lab.jobs import Job, JobState
+from server.lab.jobs.job import Job, JobState
 from server.web.ui.visiting import require_operator, told
 
 

@@ -7,7 +7,7 @@ from nicegui import ui
 
 from daq.run.state import RunOutcome
 from server.lab.duty import Health
-from server.lab.jobs import JobKind, JobState
+from server.lab.jobs.job import JobKind, JobState
 from server.lab.services import Context
 
 

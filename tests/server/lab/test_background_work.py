@@ -14,7 +14,7 @@ from websockets.sync.client import connect
 
 from daq.devices import GeneratorStatus
 from daq.run.events import ShotRecorded
-from server.lab.jobs import JobKind
+from server.lab.jobs.job import JobKind
 from server.lab.services import Services
 from server.web.app import create_api
 from tests.server.web.test_api import use_a_calibration, wait_for_jobs

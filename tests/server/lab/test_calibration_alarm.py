@@ -11,7 +11,7 @@ from fastapi import FastAPI
 
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.runs.run_check import self_calibrate_run
-from server.lab.jobs import JobKind
+from server.lab.jobs.job import JobKind
 from server.lab.services import Services
 from server.lab.tasks import check_run
 from server.web.app import create_api

@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from server.lab.calibration_story import refusals_of_use, replaced_since, story_of
-from server.lab.jobs import calibration_job, check_job, reconstruction_job
+from server.lab.calibration_story import refusals_of_use, story_of
 from tests.support.serving import Serving
 
 KEPT = Path(__file__).parents[2] / "fixtures" / "v0.1.0" / "runs" / "calibrations"
@@ -72,19 +71,3 @@ def test_pictures_are_served_and_nothing_else(server: Serving, name: str) -> Non
     answer = server.http.get("/api/calibrations/drawn/pictures/errors.png")
     assert (answer.status_code, answer.headers["content-type"]) == (200, "image/png")
     assert server.http.get(f"/api/calibrations/drawn/pictures/{name}.png").status_code == 404
-
-
-def test_a_calibration_that_was_replaced_under_its_name_is_no_longer_that_of_its_jobs(server: Serving) -> None:
-    data_dir, context = server.services.data_dir, server.app.state.context
-    (data_dir / "run" / "results" / "mlos-1").mkdir(parents=True)
-    (data_dir / "run" / "results" / "mlos-1" / "settings.json").write_text('{"calibration": "cal-1"}')
-    fitted = calibration_job("run", "cal", "pinhole").model_copy(update={"result": {"calibration": "cal-1"}})
-    jobs = [
-        fitted,
-        check_job("run", 0, "cal", content="cal-1"),
-        reconstruction_job("run", 0, "cal", "mlos-1", {}),
-        reconstruction_job("run", 1, "cal", "nothing-yet", {}),
-    ]
-    for content, replaced in (("cal-1", set()), ("cal-2", {job.id for job in jobs[:3]})):
-        (data_dir / "calibrations" / "cal.json").write_text(json.dumps({"id": content}))
-        assert replaced_since(context, jobs) == replaced

@@ -13,7 +13,8 @@ from server.lab.engine.inline_engine import InlineEngine
 from server.lab.engine.task import OnProgress, Task, Unavailable, Values
 from server.lab.errors import Conflict
 from server.lab.events import EventPublisher
-from server.lab.jobs import Job, JobKind, JobState, JobTable, check_job, reconstruction_job, shot_job
+from server.lab.jobs.job import Job, JobKind, JobState, check_job, reconstruction_job, shot_job
+from server.lab.jobs.job_table import JobTable
 from server.lab.runner import JobRunner
 from server.lab.watch import CalibrationWatch
 

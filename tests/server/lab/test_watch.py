@@ -9,7 +9,7 @@ from processing.calibration.fit.health import judge
 from processing.calibration.verdict import Verdict
 from processing.runs.shots.shot_check import ALARM_PX
 from server.lab.events import EventPublisher
-from server.lab.jobs import Job, JobKind, JobState, check_job, reconstruction_job
+from server.lab.jobs.job import Job, JobKind, JobState, check_job, reconstruction_job
 from server.lab.watch import CalibrationWatch
 
 RUN, CALIBRATION = "run", "cal"

@@ -13,7 +13,8 @@ from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.volume import VoxelGrid
-from server.lab.jobs import JobState, JobTable, reconstruction_job
+from server.lab.jobs.job import JobState, reconstruction_job
+from server.lab.jobs.job_table import JobTable
 from server.lab.results import DropletsSummary, ResultSet, VolumeSummary
 from server.lab.runs.run_summary import ACTIVE, DAMAGED, RunSummary
 from server.web.ui.results.droplet_table import droplet_rows

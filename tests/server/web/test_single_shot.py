@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from daq.run_plan import PulsePair, RunKind, RunPlan
-from server.lab.jobs import JobTable, reconstruction_job
+from server.lab.jobs.job import reconstruction_job
+from server.lab.jobs.job_table import JobTable
 from server.lab.runs.unkept_runs import UNKEPT_FILE, UnkeptRuns
 from tests.server.web.test_api import use_a_calibration, wait_for_jobs
 from tests.support.memory_rig import VIEWS

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from daq.run_plan import RunKind
-from server.lab.jobs import JobKind, JobState, JobTable, calibration_job, reconstruction_job, shot_job
+from server.lab.jobs.job import JobKind, JobState, calibration_job, reconstruction_job, shot_job
+from server.lab.jobs.job_table import JobTable
 from server.lab.runs.run_summary import RunSummary
 from server.web.ui.asking import answer_of
 from server.web.ui.calibrate.target_runs import target_row

@@ -9,7 +9,7 @@ from nicegui import ui
 from processing.calibration.verdict import Verdict
 from server.lab.calibration_story import CalibrationStory, story_of
 from server.lab.errors import ServerError
-from server.lab.jobs import JobKind
+from server.lab.jobs.job import JobKind
 from server.lab.services import Context
 from server.lab.starting.calibrating import use_calibration
 from server.web.ui.calibrate.target_runs import UNDER_WAY

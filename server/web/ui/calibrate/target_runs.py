@@ -7,7 +7,7 @@ from typing import Any
 from nicegui import ui
 
 from daq.run_plan import RunKind
-from server.lab.jobs import Job, JobKind, JobState
+from server.lab.jobs.job import Job, JobKind, JobState
 from server.lab.runs.run_summary import ACTIVE, DAMAGED, PACKED, RunSummary
 from server.lab.services import Context
 from server.lab.starting.calibrating import request_calibration

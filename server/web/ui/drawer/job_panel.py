@@ -9,8 +9,9 @@ from nicegui import ui
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.calibration.verdict import BELONGING, Verdict
 from processing.runs.exposure_faults import fault_lines
-from server.lab.calibration_story import replaced_since
-from server.lab.jobs import Job, JobKind, JobState, JobTable
+from server.lab.jobs.job import Job, JobKind, JobState
+from server.lab.jobs.job_table import JobTable
+from server.lab.jobs.replaced_calibrations import replaced_since
 from server.lab.services import Context
 from server.lab.starting.calibrating import use_calibration
 from server.web.ui.asking import try_to
@@ -42,7 +43,7 @@ class JobPanel:
     def _rows(self) -> list[dict[str, Any]]:
         """Of the disk: whose calibrations were replaced since."""
         jobs, current = listed_jobs(self._context.jobs), self._context.calibrations.current
-        replaced = replaced_since(self._context, jobs)
+        replaced = replaced_since(self._context.calibrations, self._context.services.data_dir, jobs)
         return [job_row(job, current, job.id in replaced) for job in jobs]
 
     def filter(self, words: str) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from daq.run_plan import RunKind
 from processing.reconstruction.choices import ReconstructionMethod
 from server.lab.errors import NotFound
-from server.lab.jobs import JobKind, JobState
+from server.lab.jobs.job import JobKind, JobState
 from server.lab.results import ResultSet, result_sets
 from server.lab.runs.run_summary import ACTIVE, DAMAGED, PACKED, RunSummary
 from server.lab.services import Context

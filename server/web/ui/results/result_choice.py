@@ -7,7 +7,7 @@ from urllib.parse import quote
 from nicegui import ui
 
 from server.lab.errors import NotFound
-from server.lab.jobs import JobKind, JobState
+from server.lab.jobs.job import JobKind, JobState
 from server.lab.results import ResultSet
 from server.lab.runs.run_summary import RunSummary
 from server.lab.services import Context

@@ -9,11 +9,11 @@ from daq.run_plan import RunKind
 from processing.reconstruction.choices import Accuracy, VoxelType
 from processing.reconstruction.choices import ReconstructionMethod as Method
 from server.lab.droplets.measurement import request_measurement, settings_within
-from server.lab.jobs import Job, calibration_job
+from server.lab.jobs.job import Job, calibration_job
+from server.lab.jobs.work_progress import WorkProgress
 from server.lab.reconstruction import request_reconstruction
 from server.lab.runs.run_summary import ACTIVE, DAMAGED, PACKED, RunSummary
 from server.lab.services import Context
-from server.lab.work_progress import WorkProgress
 from server.web.ui.asking import queue
 from server.web.ui.visiting import for_operators
 

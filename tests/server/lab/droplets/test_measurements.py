@@ -24,8 +24,8 @@ from server.lab.droplets.measured import measured_run
 from server.lab.droplets.measurement import settings_within
 from server.lab.errors import Unprocessable
 from server.lab.events import EventPublisher
-from server.lab.job_recovery import jobs_on_disk
-from server.lab.jobs import JobKind, JobState
+from server.lab.jobs.job import JobKind, JobState
+from server.lab.jobs.job_recovery import jobs_on_disk
 from server.lab.services import Services
 from server.lab.tasks import measure_shot
 from server.web.app import create_api

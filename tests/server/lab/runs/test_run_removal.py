@@ -15,7 +15,8 @@ from daq.files.run_directory import PulsePair, RunHeader, RunPlan, RunWriter, Vi
 from daq.run.events import RunStatus
 from daq.run.state import RunState
 from server.lab.errors import Conflict, NotFound, Unprocessable
-from server.lab.jobs import JobState, JobTable, reconstruction_job
+from server.lab.jobs.job import JobState, reconstruction_job
+from server.lab.jobs.job_table import JobTable
 from server.lab.runs.run_index import RunIndex
 from server.lab.runs.run_removal import RemovedRun, remove_run
 from server.lab.runs.run_store import RunStore

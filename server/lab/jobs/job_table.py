@@ -1,147 +1,29 @@
-"""Jobs of processing and their table: what was asked for, what became of it.
+"""JobTable: all jobs, in one file.
 
-::
-
-    QUEUED ──▶ RUNNING ──▶ DONE ────▶ QUEUED   (its files are gone, and it was asked for again)
-      │ ▲         ├──────▶ FAILED ──▶ QUEUED   (asked for again)
-      │ └─────────┤                            (the server died)
-      └───────────┴──────▶ ABORTED ─▶ QUEUED   (asked for again)
-
-The table is a catalogue: run directories hold the truth, and ``server.lab.job_recovery`` finds it there.
+The table is a catalogue: run directories hold the truth, and ``server.lab.jobs.job_recovery`` finds it there.
 """
 
 import json
 import threading
-from collections.abc import Callable, Collection, Iterable, Mapping
-from datetime import UTC, datetime
+from collections.abc import Callable, Collection, Iterable
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import Field, ValidationError
+from pydantic import ValidationError
 
-from daq.frozen_model import FrozenModel
 from server.lab.errors import Conflict, NotFound
+from server.lab.jobs.job import TRANSITIONS, UNSUCCESSFUL, Job, JobKind, JobState, now_utc
+from server.lab.jobs.work_progress import PROGRESS_QUERY, WorkProgress
 from server.lab.table_file import changing, table_at
-from server.lab.work_progress import PROGRESS_QUERY, WorkProgress
 
-
-class JobKind(StrEnum):
-    """What a job does."""
-
-    RECONSTRUCTION = "reconstruction"
-    MEASUREMENT = "measurement"
-    CALIBRATION = "calibration"
-    CHECK = "check"
-
-
-class JobState(StrEnum):
-    """Where a job stands."""
-
-    QUEUED = "queued"
-    RUNNING = "running"
-    DONE = "done"
-    FAILED = "failed"
-    ABORTED = "aborted"
-
-
-TRANSITIONS: Mapping[JobState, frozenset[JobState]] = {
-    JobState.QUEUED: frozenset({JobState.RUNNING, JobState.ABORTED}),
-    JobState.RUNNING: frozenset({JobState.DONE, JobState.FAILED, JobState.ABORTED, JobState.QUEUED}),
-    JobState.DONE: frozenset({JobState.QUEUED}),
-    JobState.FAILED: frozenset({JobState.QUEUED}),
-    JobState.ABORTED: frozenset({JobState.QUEUED}),
-}
-"""State -> states that may follow."""
-_UNSUCCESSFUL = (JobState.FAILED, JobState.ABORTED)
 _STRANGE = "strange"
-ENDED = (JobState.DONE, *_UNSUCCESSFUL)
-"""States of jobs that do not run or wait."""
-
-
-def now_utc() -> str:
-    """Time of day, ISO 8601."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds")
-
-
-class Job(FrozenModel):
-    """One piece of work of the processing side, by itself a complete account of it."""
-
-    id: Annotated[str, Field(description="made of run, results and shot: the same work has the same id")]
-    kind: Annotated[JobKind, Field(description="what is done")]
-    run_id: Annotated[str, Field(description="run that it works on")]
-    shot: Annotated[int | None, Field(description="index of the shot; null for a calibration")] = None
-    calibration: Annotated[str, Field(description="id of the calibration that is used, or made")]
-    results_id: Annotated[str | None, Field(description="directory of the results in the run; null if there are none")]
-    settings: Annotated[dict[str, Any], Field(description="what the work function is told")]
-    state: Annotated[JobState, Field(description="where it stands")] = JobState.QUEUED
-    result: Annotated[dict[str, Any] | None, Field(description="what it said when done")] = None
-    error: Annotated[str | None, Field(description="why it failed")] = None
-    created_utc: Annotated[str, Field(description="when it was asked for, ISO 8601")] = Field(default_factory=now_utc)
-    changed_utc: Annotated[str, Field(description="when its state last changed, ISO 8601")] = Field(
-        default_factory=now_utc
-    )
-
-
-def shot_job(
-    kind: JobKind, run_id: str, shot: int, calibration: str, results_id: str, settings: Mapping[str, Any]
-) -> Job:
-    """Job for one shot; ``results_id`` stands for settings and calibration, and names the directory of the results."""
-    return Job(
-        id=f"{run_id}.{results_id}.{shot:05d}",
-        kind=kind,
-        run_id=run_id,
-        shot=shot,
-        calibration=calibration,
-        results_id=results_id,
-        settings=dict(settings),
-    )
-
-
-def reconstruction_job(run_id: str, shot: int, calibration: str, results_id: str, settings: Mapping[str, Any]) -> Job:
-    """Job that makes the volumes of a shot."""
-    return shot_job(JobKind.RECONSTRUCTION, run_id, shot, calibration, results_id, settings)
-
-
-def finished(job: Job) -> Job:
-    """Such a job whose files are there."""
-    return job.model_copy(update={"state": JobState.DONE})
-
-
-def calibration_job(run_id: str, calibration: str, model: str) -> Job:
-    """Job that makes a calibration from a calibration run."""
-    return Job(
-        id=f"{run_id}.{calibration}",
-        kind=JobKind.CALIBRATION,
-        run_id=run_id,
-        calibration=calibration,
-        results_id=None,
-        settings={"model": model},
-    )
-
-
-def check_job(run_id: str, shot: int, calibration: str, content: str = "") -> Job:
-    """Job that measures how well a calibration fits a shot; another content of the same name is checked anew."""
-    named = f"{calibration}-{content}" if content else calibration
-    return Job(
-        id=f"{run_id}.check-{named}.{shot:05d}",
-        kind=JobKind.CHECK,
-        run_id=run_id,
-        shot=shot,
-        calibration=calibration,
-        results_id=None,
-        settings={"content": content},
-    )
-
-
 _SELECT = """
     SELECT document FROM job
     WHERE state IN (SELECT value FROM json_each(?1)) AND (?2 IS NULL OR run_id = ?2)
         AND json_extract(document, '$.kind') IN (SELECT value FROM json_each(?3))
 """
-
-
 _TABLE = """
     PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;
     CREATE TABLE IF NOT EXISTS job (
@@ -182,7 +64,7 @@ class JobTable:
             if known is None:
                 self._insert(job)
                 return job
-            if known.state not in _UNSUCCESSFUL and not (known.state is JobState.DONE and is_lost(known)):
+            if known.state not in UNSUCCESSFUL and not (known.state is JobState.DONE and is_lost(known)):
                 return known
             return self._replace(known, JobState.QUEUED, result=None, error=None)
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from server.lab.damage import set_aside, tell
 from server.lab.events import EventPublisher
-from server.lab.jobs import Job, JobKind, JobTable, finished, shot_job
+from server.lab.jobs.job import Job, JobKind, finished, shot_job
+from server.lab.jobs.job_table import JobTable
 from server.lab.results import droplet_summaries, volume_summaries
 
 TABLE_FILE = "jobs.sqlite"

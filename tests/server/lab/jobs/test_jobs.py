@@ -10,15 +10,8 @@ from hypothesis import strategies as st
 
 from daq.errors import DiskFull, DiskReadOnly, StorageError
 from server.lab.errors import Conflict, NotFound
-from server.lab.jobs import (
-    TRANSITIONS,
-    Job,
-    JobKind,
-    JobState,
-    JobTable,
-    calibration_job,
-    reconstruction_job,
-)
+from server.lab.jobs.job import TRANSITIONS, Job, JobKind, JobState, calibration_job, reconstruction_job
+from server.lab.jobs.job_table import JobTable
 
 
 @pytest.fixture
