@@ -7,26 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.analysis.droplets.bright_finder import MODEL_SHARE, BrightFit, find_bright, rms, rms_of
-from processing.analysis.droplets.companions import judged_by_company
 from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
 from processing.analysis.droplets.droplet_table import Droplets
 from processing.analysis.droplets.gaussian_blobs import BlobImages, BlobOptics, Blobs, Image
 from processing.analysis.droplets.ghost_share import GhostShare, pooled
 from processing.analysis.droplets.image_noise import noise_of
-from processing.analysis.droplets.measured_exposure import (
-    MeasuredExposure,
-    RatioLimits,
-    ShotVerdict,
-    blind_verdict,
-    check_images,
-    ghosts_within,
-    judged,
-    judged_by_twins,
-    judged_by_volume,
-    moved,
-    told_real,
-)
+from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict, told_real
 from processing.analysis.droplets.reality import Evidence, Reality, crowding, twins_of
+from processing.analysis.droplets.verdicts.blind_views import blind_verdict, check_images
+from processing.analysis.droplets.verdicts.companions import judged_by_company
+from processing.analysis.droplets.verdicts.explained_images import RatioLimits, judged
+from processing.analysis.droplets.verdicts.hidden_volume import judged_by_volume
+from processing.analysis.droplets.verdicts.twins import ghosts_within, judged_by_twins, moved
 from processing.analysis.hidden import Hidden
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS

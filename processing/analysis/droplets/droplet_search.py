@@ -62,6 +62,16 @@ class DropletSearch:
         margin_voxel = 0.5 * (np.array(self.searched.shape) - np.array(self.grid.shape))[::-1]
         return np.asarray(margin_voxel - 0.5 + shares * np.array(self.grid.shape[::-1]), dtype=np.float64)
 
+    @property
+    def ends_voxel(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper end (3,) of the grid, x, y, z in voxels of what is searched."""
+        return self.places_at(np.zeros(3)), self.places_at(np.ones(3))
+
+    def holds(self, positions_voxel: FloatArray) -> NDArray[np.bool_]:
+        """Which positions (N, 3), x, y, z in voxels of what is searched, lie in the grid."""
+        low, high = self.ends_voxel
+        return np.asarray(np.all((positions_voxel >= low) & (positions_voxel < high), axis=1))
+
     def reaches(self, positions_voxel: FloatArray) -> NDArray[np.bool_]:
         """Which positions (N, 3), x, y, z in voxels of what is searched, lie in it, or little beyond."""
         most = np.array(self.searched.shape[::-1]) - 1 + BEYOND_VOXEL

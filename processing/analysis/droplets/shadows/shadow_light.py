@@ -8,12 +8,13 @@ import numpy as np
 from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.measured_exposure import MeasuredExposure, RatioLimits, Seen, ShotVerdict, judged
+from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
 from processing.analysis.droplets.shadows.light_search import LEAST_DROPLETS, light_doubts
 from processing.analysis.droplets.shadows.masked_liquid import UNEXPLAINED
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise
 from processing.analysis.droplets.shadows.veiled_shadows import veil_doubts
+from processing.analysis.droplets.verdicts.explained_images import RatioLimits, judged
 
 LIMITS = RatioLimits(trusted=1.25, refused=2.0)
 """Of discs: overlapping shadows leave something even where all droplets are right. Simulated shots of 28 to 40 droplets

@@ -10,18 +10,7 @@ from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, found_by_class, matches, pooled
-from processing.analysis.droplets.measured_exposure import (
-    MeasuredExposure,
-    ShotVerdict,
-    blind_verdict,
-    check_images,
-    ghosts_within,
-    judged_by_twins,
-    judged_by_volume,
-    moved,
-    told_real,
-    within_grid,
-)
+from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict, told_real
 from processing.analysis.droplets.reality import twins_of
 from processing.analysis.droplets.shadows.judged_volume import (
     beside_what_is_not_known,
@@ -38,6 +27,9 @@ from processing.analysis.droplets.shadows.shadow_light import covered_share, jud
 from processing.analysis.droplets.shadows.shadow_table import sized_droplets
 from processing.analysis.droplets.shadows.shadow_union import union_defects
 from processing.analysis.droplets.size_correction import SizeCorrection
+from processing.analysis.droplets.verdicts.blind_views import blind_verdict, check_images
+from processing.analysis.droplets.verdicts.hidden_volume import judged_by_volume
+from processing.analysis.droplets.verdicts.twins import ghosts_within, judged_by_twins, moved
 from processing.analysis.hidden import Hidden
 from processing.kernels import DEFAULT_THREADS
 
@@ -160,7 +152,7 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
     knowing = knowing_views(shot, fit, fit.discs.positions_voxel)
     known = knowing >= judging_views(len(shot.images))
-    inside = known & within_grid(fit.discs.positions_voxel, search)
+    inside = known & search.holds(fit.discs.positions_voxel)
     few = beside_what_is_not_known(knowing[inside], len(shot.images), ratio, covered_share(asked, shadows))
     if verdict is ShotVerdict.GOOD and few:
         verdict, reasons = ShotVerdict.DOUBTFUL, few
@@ -180,7 +172,7 @@ def _hidden(
         search.grid.shape,
         lambda shares: is_judged(shot, fit, search.places_at(shares)),
         liquid_objects=_counted(liquid_objects(fit.liquid)) + _counted(lump),
-        droplets=int(np.count_nonzero(within_grid(fit.discs.positions_voxel[~known], search))),
+        droplets=int(np.count_nonzero(search.holds(fit.discs.positions_voxel[~known]))),
     )
 
 
@@ -263,7 +255,7 @@ def _twin_ghosts(
     light: Light = fit.optics.condenser_ratio or "gaussian"
     found = find_shadows(replace(shot, images=images, trust=trust), search, light, before_round).discs
     ghosts = ghosts_within(found.positions_voxel, truth.positions_voxel, search)
-    could = within_grid(truth.positions_voxel, search) & is_judged(shot, fit, truth.positions_voxel)
+    could = search.holds(truth.positions_voxel) & is_judged(shot, fit, truth.positions_voxel)
     is_found = matches(found.positions_voxel, truth.positions_voxel)[1] >= 0
     diameters_um = 2000 * truth.radii_voxel * search.searched.pitch_mm
     told_um = diameters_um if sizes is None else sizes.corrected(diameters_um)

@@ -10,13 +10,9 @@ from processing.analysis.droplets.bright_shot import BrightExposure, measure_bri
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, matches, told_share
-from processing.analysis.droplets.measured_exposure import (
-    RatioLimits,
-    ShotVerdict,
-    judged,
-    judged_by_twins,
-    told_real,
-)
+from processing.analysis.droplets.measured_exposure import ShotVerdict, told_real
+from processing.analysis.droplets.verdicts.explained_images import RatioLimits, judged
+from processing.analysis.droplets.verdicts.twins import judged_by_twins
 from processing.analysis.estimates import Estimate
 from processing.analysis.hidden import Hidden
 from processing.reconstruction.errors import ReconstructionError
