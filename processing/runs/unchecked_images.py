@@ -60,10 +60,9 @@ SPARSE = Unchecked(
 
 
 CROPPED = Unchecked(
-    "whether images of target and shots show the same part of every sensor: rows that were cut elsewhere in all views "
-    "alike move all droplets along y by as much, and everything agrees",
-    "nothing where OffsetY and Height of all cameras were the same for both, and no program cut rows; else images of "
-    "the target that are cut as those of the shots are",
+    "whether images of target and shots were cut alike: rows that were cut elsewhere in all views move all droplets "
+    "along y, and everything agrees",
+    "nothing where OffsetY and Height were the same for both; else images of the target that are cut as the shots are",
 )
 """Of images from elsewhere; a rig reads whole images, of target and shots alike."""
 

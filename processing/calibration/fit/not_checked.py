@@ -78,7 +78,7 @@ def _steps(calibration_set: CalibrationSet, unplaced: Sequence[str], shapeless: 
         )
     elif shaped and not steps_are_told(calibration_set.azimuths_deg.get(name, 0.0) for name in shaped):
         yield Unchecked(
-            "whether z_mm and the pitch of the target are in proportion: cameras fit steps of the stage that are all "
-            "some percent too long or too short",
+            "whether z is in proportion to x and y, as steps of a stage are to the pitch of a target: cameras fit one "
+            "that is some percent too long or too short everywhere",
             "azimuth_deg of two oblique views or more",
         )
