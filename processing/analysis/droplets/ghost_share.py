@@ -48,7 +48,7 @@ def told_share(
     if not len(p_real):
         return NOTHING_MEASURED
     if len(told) < LEAST_TOLD * len(p_real):
-        return f"unknown: the probability to be real is known of {len(told)} of {len(p_real)} droplets; {untried}"
+        return f"whether droplets are real is unknown of {len(p_real) - len(told)} of {len(p_real)}; {untried}"
     share = expected_share(float(np.sum(1 - told)), len(told), exposures_per_shot)
     if not sized and share.value > MOST_BRIGHT:
         return (

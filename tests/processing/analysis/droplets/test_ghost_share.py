@@ -48,10 +48,7 @@ def test_the_share_is_that_of_the_droplets_of_which_it_is_told() -> None:
 @pytest.mark.parametrize(
     ("p_real", "why"),
     [
-        (
-            [0.9, np.nan, np.nan],
-            "unknown: the probability to be real is known of 1 of 3 droplets; it was not tried on ",
-        ),
+        ([0.9, np.nan, np.nan], "whether droplets are real is unknown of 2 of 3; it was not tried on "),
         ([], "no droplet was measured"),
     ],
 )

@@ -29,14 +29,14 @@ def reason(*exposures: MeasuredExposure[SizedDroplets, SeenShadows]) -> str:
 
 
 def test_why_there_is_no_share_of_ghosts_is_told_once() -> None:
-    told = "unknown: the probability to be real is known of 0 of 278 droplets; "
+    told = "whether droplets are real is unknown of 278 of 278; "
     assert reason(exposure(145), exposure(133)).startswith(told)
-    assert reason(exposure(145), exposure(133)).count("probability to be real") == 1
+    assert reason(exposure(145), exposure(133)).count("whether droplets are real") == 1
 
 
 def test_beside_ligaments_they_are_the_reason_in_one_sentence() -> None:
     beside = [replace(exposure(count), hidden=Hidden(liquid_objects=15)) for count in (145, 133)]
-    told = "unknown: the probability to be real is known of 0 of 278 droplets; it was not tried "
+    told = "whether droplets are real is unknown of 278 of 278; it was not tried "
     assert reason(*beside) == f"{told}beside more ligaments and the like than 1 % of the droplets"
     assert reason(beside[0], exposure(133)).startswith(f"{told}on droplets like the others")
 
