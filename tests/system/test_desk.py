@@ -318,6 +318,10 @@ def test_a_long_name_pushes_nothing_of_a_job_out_of_sight(page: Page, server: Se
     table = jobs.locator(".q-table__middle")
     assert table.evaluate("table => table.scrollWidth <= table.clientWidth + 1")
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
+    page.goto(f"{server.http.base_url}/results/{run_id}")
+    page.get_by_role("combobox", name="Run").hover()
+    expect(page.get_by_role("tooltip")).to_have_text(f"{run_id} · sample")
+    picture(page, f"long-name-{width}")
 
 
 def test_jobs_and_events_are_found_by_words(page: Page, server: Serving) -> None:

@@ -84,8 +84,11 @@ def test_a_long_queue_hides_no_work(tmp_path: Path) -> None:
     assert len({job.id for job in listed}) == len(listed)
 
 
-def test_what_was_not_checked_is_told() -> None:
-    assert told({"cam1": view("good", 0.02)}, ("where cam1 stands",)).endswith("good; not checked where cam1 stands")
+def test_of_what_was_not_checked_only_how_much_it_is_is_told() -> None:
+    """Its sentences are long, and whole on the page Calibrate."""
+    long = tuple(f"whether {what} counts the right way" * 4 for what in ("z", "y"))
+    assert told({"cam1": view("good", 0.02)}, long).endswith("good; 2 points not checked, see Calibrate")
+    assert told({"cam1": view("good", 0.02)}, long[:1]).endswith("good; 1 point not checked, see Calibrate")
 
 
 def test_results_of_before_have_no_reasons() -> None:

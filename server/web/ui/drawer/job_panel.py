@@ -123,8 +123,12 @@ def _quality(job: Job) -> str:
     worst = max(badness, key=badness.__getitem__)
     view = result["views"][worst]
     told = f"{worst}: hold-out {_holdout_px(view):.3f} px, {view['verdict']}"
-    unchecked = [f"not checked {one['what']}" for one in result.get("not_checked", [])]
-    return "; ".join([told, *view.get("reasons", []), *unchecked])
+    return "; ".join([told, *view.get("reasons", []), *_unchecked(len(result.get("not_checked", [])))])
+
+
+def _unchecked(points: int) -> list[str]:
+    """How many there are; the page Calibrate has their sentences, which are long."""
+    return [f"{points} point{'s' if points > 1 else ''} not checked, see Calibrate"] if points else []
 
 
 def _holdout_px(view: dict[str, Any]) -> float:

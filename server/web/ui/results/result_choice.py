@@ -61,6 +61,7 @@ class ResultChoice:
             self._set = ui.select({}, label="Result set", on_change=self._choose_set)
             for choice in (self._run, self._set):
                 choice.props("dense outlined options-dense").classes("choice")
+                _tell_whole(choice)
             self._newest = ui.switch("newest", value=not self.run_id, on_change=self._on_newest).props("dense")
             with ui.button("Download", icon="download").props("flat dense no-caps"), ui.menu() as self._downloads:
                 pass
@@ -179,6 +180,13 @@ class ResultChoice:
     def _pick(self) -> None:
         """Whatever a hand has chosen stays."""
         self._newest.value = False
+
+
+def _tell_whole(choice: ui.select) -> None:
+    """What is chosen, for who points at it: a long name has no room in its field."""
+    with choice:
+        told = ui.tooltip().bind_visibility_from(choice, "value", bool)
+        told.bind_text_from(choice, "value", lambda value: dict(choice.options).get(value, ""))
 
 
 def _no_results(context: Context) -> str:

@@ -99,5 +99,4 @@ def progress_text(one: WorkProgress) -> str:
 
 
 def _choice(label: str, options: dict[str, str], value: str) -> ui.select:
-    select = for_operators(ui.select(options, value=str(value)).classes("text-xs"))
-    return select.props(f'dense borderless options-dense aria-label="{label}"')
+    return for_operators(ui.select(options, value=str(value), label=label).props("dense outlined options-dense"))
