@@ -33,6 +33,10 @@ FEW = 10
 """Pixels tell nothing."""
 MOST_HOLLOW = 0.25
 """Share of them that may be missing in intensities: noise floor and edges take a tenth."""
+DARKEST = 0.5
+"""Of the background: what is darker is a shadow, not the light of the exposure."""
+ALIKE = 0.05
+"""Pixels whose share differs by that much have the same light, but for noise."""
 SHADOWS_ABOVE = 0.6
 """Of the span of grey values: if half of the pixels are above, dark spots lie on bright ground."""
 
@@ -111,6 +115,25 @@ def odd_background(
     return ""
 
 
+def light_share(frame: Frame, background: Intensity, *, bits: int, dark: Intensity | None = None) -> float:
+    """Which share of the light of its background an exposure of shadows has, where nothing is in the way.
+
+    That is the share that most pixels have. With less light all shadows are as much paler.
+
+    Parameters
+    ----------
+    frame, background, bits, dark
+        As for ``odd_light``.
+
+    Returns
+    -------
+    float
+        NaN where pixels are too few to tell.
+    """
+    most = np.float32(2**bits - 1)
+    return _share(_above_dark(frame, dark) / most, _above_dark(background, dark) / most)
+
+
 def hollowed(
     frame: Frame,
     image: Intensity,
@@ -141,8 +164,9 @@ def hollowed(
         dense = seen > OPAQUE * np.percentile(seen, 99.9)
     elif background is not None:
         full = _above_dark(background, dark) / most
-        seen = np.where(full > NOISE, 1 - light / np.maximum(full, NOISE), np.float32(0))
-        dense = seen > OPAQUE
+        whole = np.fmin(_share(light, full), 1.0)  # what dim light takes away everywhere is no structure
+        seen = np.where(full > NOISE, whole - light / np.maximum(full, NOISE), np.float32(0))
+        dense = seen > OPAQUE * whole
     else:
         return ""
     return _lost(seen[dense], image[coarse][dense])
@@ -152,6 +176,16 @@ def _above_dark(image: Frame | Intensity, dark: Intensity | None) -> NDArray[np.
     """Grey values of the pixels that are asked, above those of the dark image."""
     coarse = np.s_[::STRIDE_PX, ::STRIDE_PX]
     return np.asarray(image[coarse] - (np.float32(0) if dark is None else dark[coarse]), np.float32)
+
+
+def _share(light: NDArray[np.float32], full: NDArray[np.float32]) -> float:
+    """Which share of the full light most pixels have; NaN of too few."""
+    shares = light[full > NOISE] / full[full > NOISE]
+    shares = shares[(shares > DARKEST) & (shares < 2 - DARKEST)]
+    if shares.size < FEW:
+        return float("nan")
+    commonest = np.argmax(np.bincount(np.rint(100 * shares).astype(np.intp))) / 100
+    return float(np.median(shares[np.abs(shares - commonest) < ALIKE]))
 
 
 def _lost(seen: NDArray[np.float32], kept: Intensity) -> str:

@@ -68,6 +68,8 @@ def average(options: Namespace) -> Outcome:
         tell_faults(f"shot {one['shot']}, exposure {options.exposure}", one)
     if result["faults"]:
         text += f"\n{len(result['faults'])} of {result['volumes']} exposures may be wrong, and are part of the mean"
+    if result["light"]:
+        text += f"\n{result['light']}"
     return Outcome(result, text)
 
 
@@ -78,6 +80,7 @@ def _average_results(options: Namespace) -> dict[str, Any]:
     from processing.runs.exposure_faults import stored_faults
     from processing.runs.results_file import volume_files
     from processing.runs.shots.meetings import stored_meetings, with_odd
+    from processing.runs.shots.shot_light import light_line, stored_settings, stored_shares
     from processing.runs.volumes.stored_average import average_volumes
 
     files = volume_files(options.results, options.exposure)
@@ -90,17 +93,19 @@ def _average_results(options: Namespace) -> dict[str, Any]:
     mean = MeanVolume.of(volume)
     told = [told for file in files if (told := stored_faults(file, copies.get(file)))]
     faults = with_odd(told, stored_meetings(files))
+    light = light_line(stored_shares(files), stored_settings(files[0]))
     if (belonging := stored_belonging(files)) is None:
-        return _written(options, mean, grid, len(files), faults, {})
+        return {**_written(options, mean, grid, len(files), faults, {}), "light": light}
     if belonging["verdict"] in ("warn", "refuse"):
         progress(f"{options.results}: droplets speak against calibration and run: {belonging['verdict']}")
     written = _written(options, mean, grid, len(files), faults, {BELONGING: json.dumps(belonging)})
-    return {"passed": belonging["verdict"] != "refuse", "belonging": belonging, **written}
+    return {"passed": belonging["verdict"] != "refuse", "belonging": belonging, **written, "light": light}
 
 
 def _average_run(options: Namespace) -> dict[str, Any]:
     from processing.calibration.calibration_file import load_calibration
     from processing.reconstruction.settings import METHOD_VERSION
+    from processing.runs.shots.shot_light import light_line
     from processing.runs.workbench import Workbench
 
     calibration = load_calibration(options.calibration)
@@ -119,7 +124,8 @@ def _average_run(options: Namespace) -> dict[str, Any]:
     written = _written(options, averaged.mean, averaged.grid, averaged.exposures, averaged.faults, made_by)
     progress(belonging.text)
     told = {"passed": belonging.passed, "belonging": belonging.record()}
-    return {**told, **written, "method": settings.method.value, "calibrated_share": share}
+    light = light_line(averaged.light, settings)
+    return {**told, **written, "light": light, "method": settings.method.value, "calibrated_share": share}
 
 
 def _averaged(

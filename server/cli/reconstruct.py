@@ -98,7 +98,8 @@ def _reconstruct_run(
         with resumable(place, indices, lambda index: [volume_path(place, index, frame) for frame in frames]):
             shots, belonging = _reconstruct_shots(options, settings, run_dir, indices, place)
     result = _result(settings, share, shots, belonging)
-    return Outcome(result, f"{volumes_table(result)}\n{place}: {_summary(result)}\n{belonging.text}")
+    told = (f"{place}: {_summary(result)}", result["light"], belonging.text)
+    return Outcome(result, "\n".join([volumes_table(result), *filter(None, told)]))
 
 
 def _result(
@@ -106,6 +107,7 @@ def _result(
 ) -> dict[str, Any]:
     from processing.reconstruction.settings import METHOD_VERSION
     from processing.runs.recipe import recipe_sha256
+    from processing.runs.shots.shot_light import light_line
 
     return {
         "passed": belonging.passed,
@@ -113,6 +115,7 @@ def _result(
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "calibrated_share": share,
         "belonging": belonging.record(),
+        "light": light_line({key: one for shot in shots for key, one in shot.light.items()}, settings),
         "views": {name: view.model_dump() for name, view in shots[0].views.items()},
         "volumes": [volume.model_dump(mode="json") for shot in shots for volume in shot.volumes],
         "cpu_s": sum(shot.cpu_s for shot in shots),

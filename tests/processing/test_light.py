@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from processing.imprint import imprint
 from processing.interlaced import rows_alternate
-from processing.light import hollowed, odd_light
+from processing.light import hollowed, light_share, odd_light
 from processing.preprocessing import Polarity, Preprocessing, intensity
 
 Grey = NDArray[np.float64]
@@ -188,6 +188,26 @@ def test_a_window_that_is_narrower_than_what_is_dense_is_told(window_px: int, ho
     told_of_it = hollowed(frame, image, "shadow", bits=8, background=background)
     assert told_of_it.startswith("loses ") == hollow
     assert bool(told_of_it) == hollow
+
+
+@pytest.mark.parametrize(("light", "window_px", "hollow"), [(0.8, 41, False), (0.8, 9, True), (1.1, 41, False)])
+def test_light_that_is_missing_everywhere_is_not_lost_to_a_window(light: float, window_px: int, hollow: bool) -> None:
+    disc = 0.7 * (np.hypot(ROWS - 40, COLUMNS - 70) < 12)
+    frame, background = grey(light * LIGHT * (1 - disc)), grey(LIGHT).astype(np.float32)
+    image = intensity(frame, Preprocessing("shadow", window_px), bits=8, background=background)
+    assert bool(hollowed(frame, image, "shadow", bits=8, background=background)) == hollow
+
+
+@pytest.mark.parametrize("light", [0.7, 0.85, 1.0, 1.1])
+@pytest.mark.parametrize("spray", ["droplets", "a veil over a third"])
+def test_the_share_of_light_is_that_beside_the_spray(light: float, spray: str) -> None:
+    missing = droplets(1) if spray == "droplets" else 0.4 * (COLUMNS < 43)
+    frame, background = grey(light * LIGHT * (1 - missing)), grey(LIGHT).astype(np.float32)
+    assert light_share(frame, background, bits=8) == pytest.approx(light, abs=0.01)
+
+
+def test_what_is_black_all_over_tells_no_share_of_light() -> None:
+    assert np.isnan(light_share(grey(0 * LIGHT), grey(LIGHT).astype(np.float32), bits=8))
 
 
 @pytest.mark.parametrize(("window_px", "hollow"), [(3, True), (41, False)])

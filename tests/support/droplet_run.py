@@ -7,7 +7,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
+from daq.files.references_file import add_references
+from daq.files.run_directory import (
+    DoubleFrame,
+    ExposureRecord,
+    ImageKey,
+    RunHeader,
+    RunReader,
+    RunWriter,
+    Shot,
+    ViewFormat,
+)
 from processing.calibration.calibration_file import save_calibration
 from processing.calibration.calibration_record import content_id
 from processing.calibration.verdict import Verdict
@@ -79,6 +89,15 @@ def write_run(
             shot = _shot(index, droplets_mm, valid=index not in invalid, covered=covered, bits=bits, speck=speck)
             writer.write_shot(shot)
         writer.finish("completed")
+    return run_dir
+
+
+def add_background(run_dir: Path, counts: float) -> Path:
+    """Even backgrounds: the shots have 200 counts where nothing is in the way."""
+    with RunReader(run_dir) as run:
+        header = run.header
+    images = {name: np.full((2, *SHAPE), counts, np.float32) for name in header.views}
+    add_references(run_dir, header, {"background": images})
     return run_dir
 
 

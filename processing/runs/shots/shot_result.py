@@ -17,7 +17,8 @@ class VolumeRecord(FrozenValue):
     ``dim_views`` have no grey value above 1/8 of the full scale: light is missing, or the run states too many bits.
     ``odd_light`` says of a view what does not fit its background or the polarity. ``empty``: no voxel is above 0.
     ``lost_share`` of the sum of all intensities is in voxels that were too faint for bytes. ``meeting`` is what other
-    exposures of the run are compared with; of two views there is none.
+    exposures of the run are compared with; of two views there is none. ``light_share`` is the share of its background's
+    light that each view has.
     """
 
     shot: int
@@ -31,6 +32,7 @@ class VolumeRecord(FrozenValue):
     empty: bool = False
     lost_share: float = 0.0
     meeting: Meeting | None = None
+    light_share: Mapping[str, float] = {}
 
 
 class ShotResult(FrozenValue):
@@ -48,3 +50,8 @@ class ShotResult(FrozenValue):
     def meetings(self) -> dict[ExposureKey, Meeting]:
         """Of its exposures, those that have one."""
         return {(one.shot, one.frame): one.meeting for one in self.volumes if one.meeting}
+
+    @property
+    def light(self) -> dict[Exposure, Mapping[str, float]]:
+        """Of its exposures, by view."""
+        return {(one.shot, one.frame): one.light_share for one in self.volumes}

@@ -20,6 +20,7 @@ from processing.runs.shots.meeting_lines import MeetingLines
 from processing.runs.shots.meetings import Meeting
 from processing.runs.shots.read_ahead import read_ahead
 from processing.runs.shots.shot_images import frame_names, require_match, shot_intensities
+from processing.runs.shots.shot_light import Shares, light_shares
 from processing.runs.workbench import References, Workbench
 from processing.volume import VoxelGrid
 
@@ -29,13 +30,17 @@ _MOST_LANES = 2
 
 @dataclass(frozen=True, eq=False)
 class Exposure:
-    """Images of an exposure, ready to be reconstructed, what is wrong with them, and what others are compared with."""
+    """Images of an exposure, ready to be reconstructed, what is wrong with them, and what others are compared with.
+
+    ``light`` is the share of its background's light, by view.
+    """
 
     shot: int
     frame: FrameName
     images: list[Intensity]
     faults: Faults
     meeting: Meeting | None
+    light: Shares
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +140,9 @@ class Chain:
                 run, shot, frame, self.settings, memory, references=references, threads=self.threads
             )
             meeting = self.lines.meeting(images) if self.lines else None
-            yield Exposure(index, frame, images, exposure_faults(run, shot, frame, images, references), meeting)
+            faults = exposure_faults(run, shot, frame, images, references)
+            light = light_shares(run, shot, frame, references)
+            yield Exposure(index, frame, images, faults, meeting, light)
 
 
 def _reconstructors(

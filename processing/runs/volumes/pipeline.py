@@ -21,6 +21,7 @@ from processing.runs.results_file import Provenance, claim_results, volume_path
 from processing.runs.shots.clocked_slabs import ClockedSlabs
 from processing.runs.shots.lanes import in_lanes
 from processing.runs.shots.meetings import MEETING
+from processing.runs.shots.shot_light import LIGHT_SHARE
 from processing.runs.shots.shot_result import ShotResult, VolumeRecord
 from processing.runs.volumes.chain import Chain, Exposure
 from processing.runs.workbench import Workbench
@@ -151,12 +152,14 @@ def _reconstruct(
         empty=slabs.empty,
         lost_share=volume.losses.intensity_share if volume.losses else 0.0,
     )
-    return record.model_copy(update={**exposure.faults, "meeting": exposure.meeting})
+    return record.model_copy(update={**exposure.faults, "meeting": exposure.meeting, LIGHT_SHARE: exposure.light})
 
 
 def _named(chain: Chain, exposure: Exposure) -> Provenance:
     """Where a volume comes from, and what is wrong with its images."""
     found = {name: json.dumps(which) for name, which in exposure.faults.items() if which}
+    if exposure.light:
+        found[LIGHT_SHARE] = json.dumps(exposure.light)
     if exposure.meeting:
         found[MEETING] = exposure.meeting.model_dump_json()
     return {**chain.provenance, **found, "recipe_sha256": recipe_sha256("reconstruct", METHOD_VERSION, chain.settings)}

@@ -20,6 +20,7 @@ from processing.runs.results_file import FrameName
 from processing.runs.shots.meeting_lines import MeetingLines
 from processing.runs.shots.meetings import ExposureKey, Meeting, seldom_meeting, with_odd
 from processing.runs.shots.shot_images import require_match, shot_intensities
+from processing.runs.shots.shot_light import Shares, light_shares
 from processing.runs.workbench import References, Workbench
 from processing.volume import VoxelGrid
 
@@ -42,6 +43,8 @@ class RunAverage:
         Shots whose images may be wrong, and how: ``shot``, and what ``exposure_faults`` has found.
     seldom : list of int
         Shots in which lines of sight meet much more seldom than in the others, see ``seldom_meeting``.
+    light : mapping
+        Share of its background's light, by exposure and view.
     """
 
     mean: MeanVolume
@@ -49,6 +52,7 @@ class RunAverage:
     exposures: int
     faults: tuple[Mapping[str, Any], ...]
     seldom: list[int]
+    light: Mapping[Exposure, Shares]
 
 
 def average_run(
@@ -96,14 +100,16 @@ def average_run(
         faults: list[Mapping[str, Any]] = []
         lines, meetings = MeetingLines.of(calibration, tuple(run.header.views)), dict[ExposureKey, Meeting]()
         references = bench.references(run)
-        exposures = _exposures(run, shots, frame, calibration, settings, references, done, threads, faults)
+        light = dict[Exposure, Shares]()
+        exposures = _exposures(run, shots, frame, calibration, settings, references, done, threads, faults, light)
         if lines:
             exposures = _looked_at(exposures, shots, frame, lines, meetings)
         if settings.method.iterative:
             mean = MeanVolume.of(_mean_of_each(Reconstructor.of(plan, settings, threads), exposures))
         else:
             mean = mean_volume(plan, exposures, settings.method, threads=threads)
-        return RunAverage(mean, plan.grid, len(shots), tuple(with_odd(faults, meetings)), seldom_meeting(meetings))
+        told, seldom = tuple(with_odd(faults, meetings)), seldom_meeting(meetings)
+        return RunAverage(mean, plan.grid, len(shots), told, seldom, light)
 
 
 def _looked_at(
@@ -129,8 +135,9 @@ def _exposures(
     done: Callable[[int, int], None],
     threads: int,
     faults: list[Mapping[str, Any]],
+    light: dict[Exposure, Shares],
 ) -> Exposures:
-    """Images of exposure after exposure; those that may be wrong are added to ``faults``."""
+    """Images of exposure after exposure; ``faults`` gets those that may be wrong, ``light`` the shares of all."""
     before: dict[bytes, int] = {}
     for count, index in enumerate(shots, start=1):
         shot = run.read_shot(index, "a" if frame == "a" else "ab")
@@ -142,6 +149,7 @@ def _exposures(
         }
         if told := {name: what for name, what in found.items() if what or name == "copy_of"}:
             faults.append({"shot": index, **told})
+        light[index, frame] = light_shares(run, shot, frame, references)
         yield images
         done(count, len(shots))
 

@@ -9,7 +9,7 @@ import pytest
 from processing.reconstruction.volume_file import read_volume
 from server.cli.main import main
 from tests.support.command_line import GRID, refused, shown, told
-from tests.support.droplet_run import write_run
+from tests.support.droplet_run import add_background, write_run
 
 
 @pytest.mark.parametrize("voxels", ["float32", "uint8"])
@@ -117,6 +117,20 @@ def test_exposures_that_may_be_wrong_are_told_with_the_mean(
     faults = json.loads(output.out.splitlines()[-1])["faults"]
     assert [(one["shot"], one["blind_views"]) for one in faults] == [(0, ["view2"]), (1, ["view2"])]
     assert json.loads(str(read_volume(tmp_path / "mean.vtkhdf")[2]["faults"])) == faults
+
+
+@pytest.mark.parametrize("straight", [False, True], ids=["of results", "of a run"])
+def test_dim_light_is_told_once_with_what_it_makes_fainter(
+    straight: bool, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_dir = add_background(write_run(tmp_path / "dim", shots=2), 222)
+    options = ["--calibration", calibration_file, f"--grid={GRID}"]
+    line = "had less than their backgrounds: voxels by mlos are up to 27 % fainter for that alone (shot 0, exposure A"
+    assert f"light: 4 of 4 exposures {line}" in shown(capsys, "reconstruct", run_dir, *options, "-o", tmp_path / "out")
+    source = [run_dir, *options] if straight else [tmp_path / "out"]
+    told_of_mean = shown(capsys, "average", *source, "-o", tmp_path / "mean.vtkhdf")
+    assert told_of_mean.count("light: ") == 1
+    assert f"light: 2 of 2 exposures {line}" in told_of_mean
 
 
 @pytest.mark.parametrize("straight", [False, True], ids=["of results", "of a run"])

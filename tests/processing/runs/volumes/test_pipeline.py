@@ -26,12 +26,21 @@ from processing.reconstruction.volume_file import VolumeFileError, open_volume, 
 from processing.runs.errors import PipelineError, Stopped
 from processing.runs.results_file import claim_results, volume_files, volume_path
 from processing.runs.shots.shot_images import shot_intensities
+from processing.runs.shots.shot_light import fainter, light_line, stored_settings, stored_shares
 from processing.runs.shots.shot_result import ShotResult
 from processing.runs.volumes.pipeline import reconstruct_shot, reconstruct_shots
 from processing.runs.volumes.stored_average import average_volumes
 from processing.runs.workbench import Workbench
 from processing.volume import VoxelGrid
-from tests.support.droplet_run import DROPLETS_A_MM, MOTION_MM, SHAPE, cameras, write_calibration, write_run
+from tests.support.droplet_run import (
+    DROPLETS_A_MM,
+    MOTION_MM,
+    SHAPE,
+    add_background,
+    cameras,
+    write_calibration,
+    write_run,
+)
 
 GRID = VoxelGrid.centred((61, 81, 81), 0.05)
 SETTINGS = ReconstructionSettings(grid=GridSettings.of(GRID), minimum_window_px=0)
@@ -190,6 +199,27 @@ def test_what_is_wrong_with_the_light_is_told_with_the_volume(calibration_file: 
         assert json.loads(str(provenance["dim_views"])) == ["view2"]
     fine = reconstructed(write_run(tmp_path / "fine"), calibration_file)
     assert [(volume.dim_views, volume.empty) for volume in fine.volumes] == 2 * [((), False)]
+
+
+@pytest.mark.parametrize("method", ["mlos", "minlos"])
+def test_the_light_of_a_shot_is_kept_with_its_volume_and_told_where_values_are_compared(
+    method: str, calibration_file: Path, tmp_path: Path
+) -> None:
+    settings = SETTINGS.model_copy(update={"method": ReconstructionMethod(method), "minimum_window_px": 201})
+    bright, dim = (
+        reconstructed(add_background(write_run(tmp_path / str(counts)), counts), calibration_file, settings)
+        for counts in (200, 250)
+    )
+    assert [dict(one) for one in dim.light.values()] == 2 * [dict.fromkeys(cameras(), 0.8)]
+    assert [dict(one) for one in bright.light.values()] == 2 * [dict.fromkeys(cameras(), 1.0)]
+    files = volume_files(tmp_path / "250" / "results")
+    assert (stored_shares(files), stored_settings(files[0])) == (dim.light, settings)
+    seen = [tmp_path / counts / "results" / "shot_00000_a.vtkhdf" for counts in ("200", "250")]
+    brightest = [float(read_volume(file)[0].max()) for file in seen]
+    assert fainter(dim.light[0, "a"], settings) == pytest.approx(1 - brightest[1] / brightest[0], abs=0.04)
+    assert light_line(bright.light, settings) == ""
+    assert light_line(dim.light, settings).startswith("light: 2 of 2 exposures had less than their backgrounds")
+    assert light_line(dim.light, settings.model_copy(update={"minimum_window_px": 0})) == ""
 
 
 def test_twelve_bits_in_words_of_sixteen_are_told(calibration_file: Path, tmp_path: Path) -> None:
