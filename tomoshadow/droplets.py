@@ -13,6 +13,7 @@ from processing.count import require_count
 from processing.grey_image import require_image
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, Polarity
+from processing.reconstruction.planning.calibrated_plan import telling_where
 from processing.volume import VoxelGrid
 
 
@@ -81,7 +82,8 @@ def measure(
     names = tuple(images)
     calibration.require_usable(names)
     mappings = [calibration.views[name].mapping for name in names]
-    search = plan_droplets(mappings, grid, names, margin_voxel=margin_voxel)
+    with telling_where(calibration, grid):
+        search = plan_droplets(mappings, grid, names, margin_voxel=margin_voxel)
     if polarity == "shadow":
         return measure_shadows(list(images.values()), search, light=light, twins=twins, seed=seed, threads=threads)
     return measure_bright(list(images.values()), search, twins=twins, seed=seed, threads=threads)

@@ -21,9 +21,8 @@ from processing.preprocessing import Intensity, Polarity, Preprocessing
 from processing.reconstruction import smart as iterative
 from processing.reconstruction.choices import Accuracy, ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
-from processing.reconstruction.planning.calibrated_plan import default_grid
-from processing.reconstruction.planning.common_volume import too_coarse
-from processing.reconstruction.planning.plan import Plan, plan_reconstruction
+from processing.reconstruction.planning.calibrated_plan import calibrated_plan, default_grid, told_coarse
+from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.smart import SmartResult
 from processing.volume import VoxelGrid
 
@@ -92,9 +91,8 @@ def plan(
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise ValueError(f"views {', '.join(twice)} are named twice; each sees the volume once")
     calibration.require_usable(names)
-    mappings = [calibration.views[name].mapping for name in names]
-    planned = plan_reconstruction(mappings, grid, Accuracy(accuracy), names)
-    if coarse := too_coarse(mappings, grid):
+    planned = calibrated_plan(calibration, grid, names, Accuracy(accuracy))
+    if coarse := told_coarse(calibration, grid, names):
         warnings.warn(coarse, stacklevel=2)
     return planned
 

@@ -189,10 +189,12 @@ def reconstruction_settings(options: Namespace, calibration: "Calibration") -> "
 
 def calibrated_share(options: Namespace, settings: "ReconstructionSettings", calibration: "Calibration") -> float:
     """Which part of the calibrated volume the grid holds; of a grid that nobody stated, the user is told."""
-    from processing.reconstruction.planning.calibrated_plan import default_grid
+    from processing.reconstruction.planning.calibrated_plan import default_grid, told_coarse
     from processing.reconstruction.planning.common_volume import share_within
 
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
+    if coarse := told_coarse(calibration, grid):
+        progress(coarse)
     ranges_mm = (calibration.x_range_mm, calibration.y_range_mm, calibration.z_range_mm)
     share = share_within(grid, *ranges_mm)
     if not options.grid and not getattr(options, "recipe", None):

@@ -8,7 +8,7 @@ import numpy as np
 
 from processing.geometry import FloatArray, ViewMapping
 from processing.kernels import _native
-from processing.reconstruction.errors import ReconstructionError
+from processing.reconstruction.errors import RoughMapping
 from processing.reconstruction.planning.bending import bend_px
 from processing.reconstruction.planning.node_view import project_lattice
 from processing.volume import VoxelGrid
@@ -85,8 +85,8 @@ def sight_lattice(mappings: Sequence[ViewMapping], grid: VoxelGrid) -> SightLatt
 
     Raises
     ------
-    ReconstructionError
-        A mapping is too rough even for nodes two voxels apart.
+    RoughMapping
+        One is too rough even for nodes two voxels apart.
     """
     deviation_px = np.inf
     for spacing in _native.NODE_SPACINGS:
@@ -97,7 +97,7 @@ def sight_lattice(mappings: Sequence[ViewMapping], grid: VoxelGrid) -> SightLatt
         )
         if deviation_px <= MAX_DEVIATION_PX:
             return SightLattice(np.ascontiguousarray(nodes_px, dtype=np.float64), spacing, deviation_px)
-    raise ReconstructionError(
+    raise RoughMapping(
         f"a mapping bends by {deviation_px:.3g} px within {_native.NODE_SPACINGS[-1]} voxels, limit "
         f"{MAX_DEVIATION_PX} px: droplets cannot be measured; does the grid reach beyond what was calibrated?"
     )

@@ -92,7 +92,7 @@ def too_coarse(mappings: Sequence[ViewMapping], grid: VoxelGrid) -> str:
     """What to say of voxels that are wider than ``MOST_PX_PER_VOXEL``; empty where they are not."""
     middle_mm = grid.to_mm((np.array([grid.shape]) - 1) / 2)[0]
     finest_px_per_mm = max(scale_px_per_mm(mapping, middle_mm) for mapping in mappings)
-    if (width_px := grid.pitch_mm * finest_px_per_mm) <= MOST_PX_PER_VOXEL:
+    if not (width_px := grid.pitch_mm * finest_px_per_mm) > MOST_PX_PER_VOXEL:
         return ""
     return (
         f"a voxel is {width_px:.2g} px wide, and looked at in its middle alone: droplets of a few pixels are missed or "

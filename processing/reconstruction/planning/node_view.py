@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, ViewMapping
 from processing.kernels import _native
-from processing.reconstruction.errors import ReconstructionError
+from processing.reconstruction.errors import RoughMapping
 from processing.reconstruction.planning.bending import bend_px
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.volume import VoxelGrid
@@ -86,8 +86,8 @@ def sample_mapping(mapping: ViewMapping, grid: VoxelGrid, max_deviation_px: floa
 
     Raises
     ------
-    ReconstructionError
-        The mapping is too rough even for nodes two voxels apart.
+    RoughMapping
+        It is too rough even for nodes two voxels apart.
     """
     deviation_px = np.inf
     for spacing in _native.NODE_SPACINGS:
@@ -95,7 +95,7 @@ def sample_mapping(mapping: ViewMapping, grid: VoxelGrid, max_deviation_px: floa
         deviation_px = bend_px(nodes_px, partial(project_lattice, mapping, grid, spacing))
         if deviation_px <= max_deviation_px:
             return _node_view(mapping, nodes_px, spacing, deviation_px)
-    raise ReconstructionError(
+    raise RoughMapping(
         f"mapping is not smooth: it bends by {deviation_px:.3g} px within {_native.NODE_SPACINGS[-1]} voxels, "
         f"limit {max_deviation_px} px; does the grid reach beyond what was calibrated?"
     )

@@ -150,7 +150,7 @@ def _plan_named(name: str, mapping: ViewMapping, grid: VoxelGrid, accuracy: Accu
     try:
         return plan_view(mapping, grid, accuracy)
     except ReconstructionError as error:
-        raise ReconstructionError(f"{name}: {error}") from error
+        raise type(error)(f"{name}: {error}") from error
 
 
 def _check_instructions() -> None:

@@ -117,10 +117,7 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float, max_
     nodes_px = points_at((0.0, 0.0))
     recorded_px_per_voxel = reference_scale * np.linalg.norm(np.diff(nodes_px, axis=1), axis=-1).mean() / MAP_SPACING_PX
     if recorded_px_per_voxel > MAX_PIXELS_PER_VOXEL:
-        raise NotRectifiable(
-            f"a voxel covers {recorded_px_per_voxel:.2g} px, limit {MAX_PIXELS_PER_VOXEL} px; "
-            "what is smaller than a voxel may lie between two"
-        )
+        raise NotRectifiable(f"a voxel is {recorded_px_per_voxel:.2g} px wide, limit {MAX_PIXELS_PER_VOXEL} px")
     deviation_px = bend_px(nodes_px, points_at) + _deviation_px(mapping, grid, centre, to_reference)
     if deviation_px > max_deviation_px:
         raise NotRectifiable(f"rectified it would be off by {deviation_px:.2g} px, limit {max_deviation_px} px")

@@ -20,7 +20,7 @@ from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
-from processing.reconstruction.planning.calibrated_plan import default_grid
+from processing.reconstruction.planning.calibrated_plan import default_grid, telling_where
 from processing.reconstruction.settings import GridSettings
 from processing.runs.droplets.measure_settings import METHOD_VERSION, MeasureSettings, require_measurable
 from processing.runs.droplets.measured_shot import (
@@ -115,9 +115,9 @@ class RunMeasurement:
         require_match(run.run_dir.name, run.read_shot(shot), calibration)
         views = tuple(run.header.views)
         grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
-        search = plan_droplets(
-            [calibration.views[view].mapping for view in views], grid, views, margin_voxel=settings.margin_voxel
-        )
+        mappings = [calibration.views[view].mapping for view in views]
+        with telling_where(calibration, grid):
+            search = plan_droplets(mappings, grid, views, margin_voxel=settings.margin_voxel)
         references = read_references(run) if references is None else references
         if settings.polarity == "shadow":
             require_backgrounds(run, references)

@@ -77,5 +77,5 @@ def light_line(shares: Mapping[Exposure, Shares], settings: ReconstructionSettin
     how_much = f"voxels by {settings.method.value} are up to {100 * lost[faintest]:.0f} % fainter for that alone"
     return (
         f"light: {len(faint)} of {len(lost)} exposures had less than their backgrounds: {how_much} (shot {shot}, "
-        f"exposure {frame.upper()}: {views}); compare no values with those of other light, or record the background anew"
+        f"exposure {frame.upper()}: {views}); compare no values of other light, or record the background anew"
     )

@@ -36,12 +36,13 @@ class VolumeRecord(FrozenValue):
 
 
 class ShotResult(FrozenValue):
-    """What became of one shot; ``views`` tells how each view was seen."""
+    """What became of one shot; ``views`` tells how each view was seen, ``coarse`` that voxels are too wide."""
 
     shot: int
     method: ReconstructionMethod
     grid: GridSettings
     views: Mapping[str, PlannedView]
+    coarse: str = ""
     volumes: tuple[VolumeRecord, ...]
     cpu_s: float
     peak_rss_mb: float

@@ -11,6 +11,7 @@ from typing import TypedDict, Unpack
 
 from daq.files.run_directory import RunReader
 from processing.kernels import DEFAULT_THREADS
+from processing.reconstruction.planning.calibrated_plan import told_coarse
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import METHOD_VERSION, GridSettings, ReconstructionSettings
 from processing.reconstruction.slab_volume import SlabVolume
@@ -171,6 +172,7 @@ def _result(chain: Chain, volumes: Sequence[VolumeRecord], cpu_s: float) -> Shot
         method=chain.settings.method,
         grid=GridSettings.of(chain.grid),
         views=chain.views,
+        coarse=told_coarse(chain.calibration, chain.grid, tuple(chain.views)),
         volumes=tuple(volumes),
         cpu_s=cpu_s,
         peak_rss_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import tomoshadow as ts
 from processing.calibration.calibration import Model
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.calibration_record import content_id, json_id
@@ -35,10 +36,7 @@ def test_reconstruct_tells_grid_and_volumes(
         (2, "b"),
     ]
     assert {view["mapping"] for view in result["views"].values()} == {"exact"}, "voxels of 2 px are averaged"
-    assert (
-        result["views"]["view2"]["reason"]
-        == "a voxel covers 2 px, limit 1.5 px; what is smaller than a voxel may lie between two"
-    )
+    assert result["views"]["view2"]["reason"] == "a voxel is 2 px wide, limit 1.5 px"
     assert result["cpu_s"] > 0
     assert result["peak_rss_mb"] > 0
     assert all((tmp_path / "out" / volume["file"]).is_file() for volume in result["volumes"])
@@ -53,7 +51,9 @@ def test_reconstruct_says_before_the_second_shot_which_views_are_slow(
     _invalid, first, *slow, second = progress.splitlines()
     assert (first, second) == ("run: shot 0 by mlos", "run: shot 2 by mlos")
     assert [line.split()[0] for line in slow] == ["view1", "view2", "view3"]
-    assert all("takes the exact way, which is slower" in line and "a voxel covers" in line for line in slow)
+    assert all(
+        "takes the exact way, which is slower" in line and "a voxel is 2 px wide, limit 1.5 px" in line for line in slow
+    )
     heads, *volumes, summary, _belonging = output.splitlines()
     assert heads.split() == ["shot", "exposure", "seconds", "file"]
     assert [tuple(line.split()[:2]) for line in volumes] == [("0", "A"), ("0", "B"), ("2", "A"), ("2", "B")]
@@ -153,6 +153,30 @@ def test_a_grid_that_nobody_stated_says_what_it_holds(
     assert 0.5 < share <= 1
     small = told(capsys, *common, "-o", tmp_path / "small", "--grid=-3:0,-2.5:2.5,-1.5:1.5@0.1")
     assert small["calibrated_share"] == pytest.approx(0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("command", ["reconstruct", "average"])
+def test_coarse_voxels_are_told_in_the_words_of_python(
+    command: str, run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    calibration = load_calibration(calibration_file)
+    with pytest.warns(UserWarning, match="^a voxel is 6 px wide") as warned:
+        ts.plan(calibration, ts.VoxelGrid((9, 9, 9), (-1.2, -1.2, -1.2), 0.3))
+    out = tmp_path / "out.vtkhdf"
+    common = [command, run_dir, "--calibration", calibration_file, "-o", out]
+    assert main([*map(str, common), "--grid=-1.2:1.2,-1.2:1.2,-1.2:1.2@0.3"]) == 0
+    assert capsys.readouterr().err.count(str(warned[0].message)) == 1
+
+
+@pytest.mark.parametrize("command", ["reconstruct", "measure"])
+def test_a_box_in_um_is_told_to_lie_far_outside(
+    command: str, run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = [command, run_dir, "--calibration", calibration_file, "-o", tmp_path / "out"]
+    assert refused(capsys, *common, "--grid=-1000:1000,-500:500,-500:500@50") == (
+        "the grid, x -1000 to 1000, y -500 to 500, z -500 to 500 mm, lies far outside of what was calibrated, x -3 to "
+        "3, y -2.5 to 2.5, z -1.5 to 1.5 mm: there no mapping is known; is it in mm, and where the target was?"
+    )
 
 
 def test_a_grid_beyond_the_target_is_asked_about(

@@ -176,6 +176,14 @@ def test_a_volume_whose_run_and_calibration_disagree_is_not_green() -> None:
     )
 
 
+def test_coarse_voxels_are_told_of_a_reconstruction() -> None:
+    view = {"reason": "a voxel is 6 px wide, limit 1.5 px"}
+    result = {"views": {"view1": view}, "coarse": "droplets are missed or pale", "volumes": [], "belonging": GOOD}
+    job = reconstruction_job("run", 0, "cal", "mlos-0", {"method": "mlos"})
+    row = job_row(job.model_copy(update={"state": JobState.DONE, "result": result}))
+    assert row["detail"] == "droplets are missed or pale; view1 exact: a voxel is 6 px wide, limit 1.5 px"
+
+
 @pytest.mark.parametrize(
     ("faults", "text"),
     [

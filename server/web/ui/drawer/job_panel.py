@@ -136,14 +136,14 @@ def _holdout_px(view: dict[str, Any]) -> float:
 
 
 def _volumes(job: Job) -> str:
-    """What is wrong with the images of an exposure, and the views that could not be rectified; nothing where all is."""
+    """What is wrong with images or voxels, and the views that could not be rectified; nothing where all is."""
     result = job.result or {}
     views = result.get("views", {})
     faults = [
         f"exposure {volume['frame']}: {line}" for volume in result.get("volumes", ()) for line in fault_lines(volume)
     ]
     slow = [f"{name} exact: {view['reason']}" for name, view in views.items() if view["reason"]]
-    return "; ".join([*faults, *slow])
+    return "; ".join(filter(None, [*faults, result.get("coarse"), *slow]))
 
 
 def _belonging(job: Job) -> str:

@@ -129,7 +129,7 @@ def test_a_voxel_is_as_large_to_a_telecentric_view_from_wherever_it_looks() -> N
     [
         (Telecentric(), GRID, "its lines of sight|rectified it would be off"),
         (camera(90.0), GRID, "meet beside the volume"),
-        (camera(0.0), VoxelGrid.centred((9, 9, 9), 4 / 60), r"a voxel covers 4 px, limit 1\.5 px"),
+        (camera(0.0), VoxelGrid.centred((9, 9, 9), 4 / 60), r"a voxel is 4 px wide, limit 1\.5 px"),
         (camera(0.0), VoxelGrid.centred((9001, 9, 9), 1.2 / 60), r"seen at 0\.\d\d of the scale .* limit 0\.63"),
     ],
 )
