@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from daq.files.run_directory import RunReader, ShotFileError
-from daq.files.run_file import RUN_FILE
 from processing.analysis.droplets.droplet_file import REMEDY, DropletFileError, StoredDroplets, read_droplets
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL
 from processing.analysis.seal import SEAL
 from processing.reconstruction.settings import GridSettings
+from processing.runs.run_around import of_another_run
 
 _NAME = re.compile(r"shot_(\d+)_droplets")
 
@@ -36,23 +35,11 @@ def read_in_place(path: str | Path) -> StoredDroplets:
 
 
 def _require_own_name(path: Path, provenance: Mapping[str, Any]) -> None:
-    named, shot, run = _NAME.fullmatch(path.stem), provenance.get("shot"), provenance.get("run")
+    named, shot = _NAME.fullmatch(path.stem), provenance.get("shot")
     if named and shot is not None and int(named[1]) != shot:
         raise DropletFileError(f"{path}: was renamed, it holds the droplets of shot {shot}: give it its name back")
-    around = _run_around(path)
-    if run is not None and around not in (None, run):
-        raise DropletFileError(f"{path}: holds droplets of run {run} and lies in run {around}: bring it back")
-
-
-def _run_around(path: Path) -> str | None:
-    """Id of the run in whose results a file lies; None if it lies elsewhere, or nobody can read the run."""
-    folders = path.resolve().parents
-    if len(folders) < 3 or folders[1].name != "results" or not (folders[2] / RUN_FILE).is_file():
-        return None
-    try:
-        return RunReader(folders[2]).header.run_id
-    except ShotFileError:
-        return None
+    if another := of_another_run(path, provenance):
+        raise DropletFileError(f"{path}: holds droplets {another}: bring it back")
 
 
 def _require_in_box(path: Path, stored: StoredDroplets) -> None:

@@ -21,6 +21,7 @@ from processing.reconstruction.slab_volume import SlabVolume
 from processing.reconstruction.volume_file import VolumeFileError, open_volume, write_slabs
 from processing.reconstruction.volume_part import PartError, RangesMm
 from processing.runs.results_file import SETTINGS_FILE, Provenance, volume_files
+from processing.runs.run_around import of_another_run
 from processing.runs.volumes.volume_parts import Recipe, VolumePart, VolumeParts, stored_part
 from processing.volume import VoxelGrid
 from server.lab.calibrations import CalibrationStore
@@ -113,6 +114,8 @@ def preview_of(volume: Path) -> VolumePreview:
     ------
     Damaged
         The volume cannot be read, or is that of another shot, exposure, run, or of other settings; the text names it.
+    Conflict
+        It was made of another run than now lies around it.
     """
     stored = preview_path(volume)
     try:
@@ -166,7 +169,7 @@ def remaking(volume: Path) -> dict[str, Any]:
     """
     try:
         made_by = load_provenance(preview_path(volume))
-        _require_own_name(volume, made_by)
+        _require_own_place(volume, made_by)
         return {
             "run_dir": str(volume.parents[2]),
             "shot": int(made_by["shot"]),
@@ -195,6 +198,8 @@ def _require_own_place(volume: Path, made_by: Provenance) -> None:
     for name in ("run", "calibration", "settings"):
         if name in told and made_by.get(name, told[name]) != told[name]:
             raise ValueError(f"it was brought from elsewhere, and is of {name} {made_by[name]}, not {told[name]}")
+    if another := of_another_run(volume, made_by):
+        raise Conflict(f"{volume.name}: is {another}; reconstruct the shot anew")
 
 
 def part_of(

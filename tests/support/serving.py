@@ -92,7 +92,7 @@ def write_spray(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[st
     volume = np.exp(-((radius - 0.35 * (y + 6)) ** 2) / 0.3) * (0.6 + 0.4 * np.sin(9 * np.arctan2(z, x) + 2 * y))
     file = Path(job["calibration_file"])
     calibration = {"calibration": json.loads(file.read_text())["id"], "calibration_file": file.name}
-    record = {"run": "x", **calibration, "settings": json.dumps(job["settings"])}
+    record = {"run": Path(job["run_dir"]).name, **calibration, "settings": json.dumps(job["settings"])}
     (results_dir / "settings.json").write_text(json.dumps(record))
     files = []
     for frame in "ab":

@@ -51,9 +51,7 @@ def test_reconstruct_says_before_the_second_shot_which_views_are_slow(
     _invalid, first, *slow, second = progress.splitlines()
     assert (first, second) == ("run: shot 0 by mlos", "run: shot 2 by mlos")
     assert [line.split()[0] for line in slow] == ["view1", "view2", "view3"]
-    assert all(
-        "takes the exact way, which is slower" in line and "a voxel is 2 px wide, limit 1.5 px" in line for line in slow
-    )
+    assert all(re.search(r"takes the exact way, which is slower.*px wide, limit 1.5 px", line) for line in slow)
     heads, *volumes, summary, _belonging = output.splitlines()
     assert heads.split() == ["shot", "exposure", "seconds", "file"]
     assert [tuple(line.split()[:2]) for line in volumes] == [("0", "A"), ("0", "B"), ("2", "A"), ("2", "B")]

@@ -130,6 +130,26 @@ def test_a_part_of_another_volume_than_was_kept_is_refused(kept: Kept) -> None:
         part_of(parts, volume, kept.store, ALL)
 
 
+@pytest.mark.parametrize("other", ["other", "run"], ids=["another name", "the same name"])
+def test_what_was_made_of_a_run_is_not_shown_of_another_one_in_its_place(
+    other: str, server: Serving, tmp_path: Path
+) -> None:
+    kept = kept_in(server.services.data_dir)
+    volume = kept.made(SETTINGS)
+    kept.whole(SETTINGS, volume.parent)
+    at = f"/api/runs/run/results/{volume.parent.name}/{volume.stem}"
+    asked = ["", "/slices/z/3.png", "/projections/x.png", "/surface.glb", "/region.f32?z_mm=0", "/volume.vtkhdf"]
+    assert [server.http.get(at + what).status_code for what in asked] == 6 * [200]
+    stranger = write_run(tmp_path / "elsewhere" / other, created_utc="2026-01-02T00:00:00+00:00")
+    (stranger / "run.h5").replace(kept.run_dir / "run.h5")
+    told = [server.http.get(at + what) for what in asked]
+    assert [answer.status_code for answer in told] == 6 * [409]
+    known_by = "lies in run other" if other == "other" else "began at 2026-01-02T00:00:00"
+    assert all(known_by in answer.json()["detail"] for answer in told)
+    volume.unlink()
+    assert server.http.get(f"{at}/volume.vtkhdf").status_code == 409
+
+
 @dataclass(frozen=True)
 class Looking:
     """A server with a run and a preview in it."""

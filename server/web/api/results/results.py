@@ -29,7 +29,7 @@ router = APIRouter(prefix="/api/runs/{run_id}/results", tags=["results"])
 Axis = Annotated[Literal["x", "y", "z"], Path(description="axis of the world across which the picture lies")]
 VolumeName = Annotated[str, Path(pattern=r"^shot_[0-9]{5,7}_[ab]$", description="for example shot_00012_a")]
 ColoursOf = Annotated[Colours, Query(description="heat; blue and red can be laid one upon the other")]
-_PNG = {**responses(404, 500), 200: {"content": {"image/png": {}}}}
+_PNG = {**responses(404, 409, 500), 200: {"content": {"image/png": {}}}}
 
 
 class PreviewView(FrozenModel):
@@ -48,7 +48,7 @@ def list_results(run_id: RunId, context: ContextOf) -> list[ResultSet]:
     return result_sets(context.runs.directory(run_id))
 
 
-@router.get("/{results_id}/{volume}", responses=responses(404, 500))
+@router.get("/{results_id}/{volume}", responses=responses(404, 409, 500))
 def show_preview(run_id: RunId, results_id: ResultsId, volume: VolumeName, context: ContextOf) -> PreviewView:
     """Size and place of a preview."""
     preview = preview_of(volume_file(context.runs.directory(run_id), results_id, volume))
@@ -104,7 +104,7 @@ def show_projection(
 @router.get(
     "/{results_id}/{volume}/surface.glb",
     response_class=Response,
-    responses={**responses(404, 500), 200: {"content": {"model/gltf-binary": {}}}},
+    responses={**responses(404, 409, 500), 200: {"content": {"model/gltf-binary": {}}}},
 )
 def show_surface(
     run_id: RunId,
@@ -119,7 +119,11 @@ def show_surface(
 
 
 def _volume(context: Context, run_id: str, results_id: str, volume: str) -> FilePath:
-    return volume_file(context.runs.directory(run_id), results_id, volume)
+    """Its file, that of a former run not."""
+    path = volume_file(context.runs.directory(run_id), results_id, volume)
+    if path.is_file():
+        preview_of(path)
+    return path
 
 
 def _plane(preview: VolumePreview, axis: Axis, index: int) -> NDArray[np.uint8]:

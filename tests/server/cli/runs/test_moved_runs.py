@@ -1,7 +1,6 @@
 """Runs that came from elsewhere, and not whole: what is missing, renamed or another run's is told."""
 
 import json
-import shutil
 from pathlib import Path
 
 import h5py
@@ -45,8 +44,13 @@ def test_a_shot_under_the_name_of_another_is_refused(run_dir: Path, capsys: pyte
 
 def test_two_runs_of_one_name_do_not_share_results(run_dir: Path, capsys: pytest.CaptureFixture[str]) -> None:
     told(capsys, *command(run_dir), "--shots", "0:1")
-    shutil.rmtree(run_dir)
-    write_run(run_dir, 3, created_utc="2026-02-01T00:00:00+00:00")
+    began = "2026-02-01T00:00:00+00:00"
+    with h5py.File(run_dir / "run.h5", "r+") as file:
+        del file["entry/created_utc"]
+        file["entry/created_utc"] = json.dumps(began)
+    assert "of another run of this name" in refused(capsys, *command(run_dir), "--shots", "1:2")
+    with h5py.File(run_dir / "shots" / "1.h5", "r+") as file:
+        file.attrs["run_created_utc"] = began
     assert "holds results of another run" in refused(capsys, *command(run_dir), "--shots", "1:2")
 
 

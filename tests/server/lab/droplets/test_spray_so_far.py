@@ -52,6 +52,16 @@ def test_a_run_that_was_exchanged_is_told_although_its_droplets_are_what_they_we
         measured_run(results_dir)
 
 
+def test_droplets_of_another_run_of_the_same_name_are_told(tmp_path: Path) -> None:
+    """Imports are called as their folders: those of two days have one name."""
+    run_dir = write_run(tmp_path / "spray", shots=3, created_utc="2026-01-02T00:00:00+00:00")
+    of = {"run": "spray", "run_created_utc": "2026-01-01T00:00:00+00:00"}
+    results_dir = write_results(run_dir / "results" / "droplets-1", cone_shots(0, 3, 40), **of)
+    (results_dir / "settings.json").write_text("{}")
+    with pytest.raises(Damaged, match=r"run spray that began at 2026-01-01T.* another one, which began at 2026-01-02T"):
+        measured_run(results_dir)
+
+
 def test_a_separation_is_proposed_within_what_the_cameras_of_the_rig_accept(tmp_path: Path) -> None:
     run_dir = write_run(tmp_path / "spray", shots=3)
     runs = RunStore(tmp_path, lambda: RunStatus(state=RunState.IDLE))
