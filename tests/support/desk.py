@@ -18,7 +18,7 @@ from tests.support.operator import VIEWS
 from tests.support.serving import Serving, plan_of, serving
 
 PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
-"""Folder for pictures of pages; without it none are taken."""
+"""Folder for pictures of pages; without it none are taken. Those of the manual are listed in CONTRIBUTING.md."""
 PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 
 

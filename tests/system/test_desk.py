@@ -206,7 +206,7 @@ def test_the_bar_is_in_sight_at_every_width_dark_and_light(page: Page, server: S
         expect(lamps).to_have_text("7 ok")
     else:
         expect(page.get_by_role("status", name=re.compile("^view1: ok"))).to_be_visible()
-    for shade in ("dark", "light"):
+    for shade in ("light", "dark"):
         picture(page, f"bar-{width}-{shade}")
         page.get_by_role("button", name="dark or light").click()
     laboratory(server).open_door()

@@ -195,6 +195,8 @@ def test_the_assistant_sets_currents_to_half_range_and_says_what_it_did(page: Pa
     page.get_by_role("button", name="Set to half range").click()
     expect(advice).to_contain_text(re.compile(r"view1: \d+ % at 6[\d.]* A: left as it is, half of the range"))
     expect(caption(live, "view4")).to_have_text(re.compile("A (49|50|51) %"))
+    page.set_viewport_size({"width": 1280, "height": 1000})
+    picture(page, "desk-live")
 
 
 def test_the_live_volume_says_what_it_lacks_and_follows_every_shot(page: Page, server: Serving) -> None:
@@ -325,7 +327,7 @@ def expect_to_fit(page: Page, name: str) -> None:
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
         expect_nothing_cut(page)
         expect_none_over_another(page)
-        for shade in ("dark", "light"):
+        for shade in ("light", "dark"):
             picture(page, f"{name}-{width}-{shade}")
             page.get_by_role("button", name="dark or light").click()
 
@@ -380,5 +382,8 @@ def test_a_spray_is_recorded_and_seen_on_the_page_run(page: Page, server: Servin
     expect(page.get_by_role("list", name="shots").get_by_role("listitem", name="shot 3: valid")).to_be_visible()
     expect(page.get_by_role("group", name="newest shots").get_by_role("img").nth(1)).to_be_visible()
     picture(page, "desk-run")
+    page.set_viewport_size({"width": 1600, "height": 950})
+    page.emulate_media(color_scheme="dark")
+    picture(page, "page")
     page.get_by_role("button", name="Stop").click()
     expect(page.get_by_label("run outcome")).to_have_text("stopped")
