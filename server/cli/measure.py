@@ -206,6 +206,7 @@ def _result(
     from processing.analysis.copied_shots import copies_told
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.droplets.droplet_statistics import droplet_statistics
+    from processing.analysis.lingering_droplets import lingering_told
     from processing.analysis.near_or_far import depth_doubts, sights_of
     from processing.analysis.velocity.velocity_statistics import velocity_statistics
     from processing.runs.droplets.measure_settings import METHOD_VERSION
@@ -217,6 +218,7 @@ def _result(
     return {
         "conditions_changed": _told(changes_told(stored, files)),
         "copies": _told(copies_told(stored)),
+        "same_droplets": _told(lingering_told(stored)),
         "depth": _told(depth_doubts(stored)),
         "polarity": settings.polarity,
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),

@@ -10,6 +10,7 @@ import numpy as np
 
 from processing.analysis.copied_shots import copies_told
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.lingering_droplets import lingering_told
 from processing.analysis.near_or_far import depth_doubts
 from processing.analysis.shot_doubts import exposure_doubts, velocity_doubts
 from processing.analysis.spray.spray_axis import SprayAxis
@@ -53,6 +54,7 @@ def spray_doubts(
         *exposure_doubts(shots),
         *velocity_doubts(shots),
         *copies_told(shots),
+        *lingering_told(shots),
         *depth_doubts(shots),
         *_of_conditions(shots),
         *(_of_equals(sample) if sample else ()),

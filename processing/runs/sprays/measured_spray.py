@@ -10,6 +10,7 @@ from typing import Any
 from processing.analysis.copied_shots import in_common
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import require_poolable
+from processing.analysis.lingering_droplets import lingering_told
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_doubts import NOT_STATED, noted
 from processing.runs.droplets_in_place import read_in_place
@@ -169,7 +170,7 @@ def read_compared(folders: Sequence[Path]) -> ComparedSprays:
         )
     first, *others = sprays
     unlike = [f"{other.name} and {first.name} differ in {what}" for other in others if (what := _unlike(first, other))]
-    return ComparedSprays(named, (*unlike, *_elsewhere(sprays), *_shared(sprays)))
+    return ComparedSprays(named, (*unlike, *_elsewhere(sprays), *_shared(sprays), *_lingering(sprays)))
 
 
 def _elsewhere(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
@@ -188,6 +189,11 @@ def _shared(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
                 f"{other.name} and {first.name} have {shared} shots in common: they are no two samples, and "
                 "chance makes less of a difference than is told"
             )
+
+
+def _lingering(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
+    for spray in sprays:
+        yield from (f"{spray.name}: {told}" for told in lingering_told(spray.shots))
 
 
 def _unlike(first: MeasuredSpray, other: MeasuredSpray) -> str:
