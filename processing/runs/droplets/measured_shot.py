@@ -12,6 +12,7 @@ from processing.analysis.droplets.ghost_share import pooled, told_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure
 from processing.analysis.estimates import Estimate
+from processing.analysis.unlike_sizes import unlike_sizes
 from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
 from processing.reconstruction.settings import FrozenValue
 from processing.runs.shots.separation import Separation
@@ -28,6 +29,15 @@ def doubted(measured: Exposure, reasons: tuple[str, ...]) -> Exposure:
         return measured
     verdict = ShotVerdict.REFUSED if measured.verdict is ShotVerdict.REFUSED else ShotVerdict.DOUBTFUL
     return replace(measured, verdict=verdict, reasons=(*reasons, *measured.reasons))
+
+
+def compared(exposures: tuple[Exposure, ...], velocities: MeasuredVelocities | None) -> tuple[Exposure, ...]:
+    """The same exposures, doubted where droplets of A and the very same ones of B have other diameters."""
+    if velocities is None:
+        return exposures
+    first, second = exposures
+    told = unlike_sizes(first.droplets, second.droplets, velocities)
+    return tuple(doubted(exposure, (told,) if told else ()) for exposure in exposures)
 
 
 class ShotVelocity(FrozenValue):

@@ -27,6 +27,7 @@ from processing.runs.droplets.measured_shot import (
     Exposure,
     MeasuredShot,
     ShotVelocity,
+    compared,
     doubted,
     droplets_path,
     shot_summary,
@@ -162,8 +163,8 @@ class RunMeasurement:
         frames = frame_names(self.run)
         measured = [self._exposure(recorded, frame, threads, should_stop) for frame in frames]
         exposures = tuple(exposure for exposure, _ in measured)
-        by_frame = dict(zip(frames, exposures, strict=True))
         velocities, velocity = shot_velocities(exposures, self.search.grid, separation_of(self.run, recorded))
+        by_frame = dict(zip(frames, exposures := compared(exposures, velocities), strict=True))
         seen = {frame: exposure.droplets for frame, exposure in by_frame.items() if exposure.views}
         objects = self.objects.measure(recorded, seen, threads)
         told = {frame: {**one.told(), **told_objects(objects.get(frame))} for frame, one in by_frame.items()}
