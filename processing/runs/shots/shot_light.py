@@ -16,7 +16,7 @@ from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError, open_volume
 from processing.runs.exposure_faults import grey_values
 from processing.runs.results_file import FrameName
-from processing.runs.shots.meetings import Exposure
+from processing.runs.shots.meetings import ExposureKey
 from processing.runs.workbench import References
 
 LIGHT_SHARE = "light_share"
@@ -37,9 +37,9 @@ def light_shares(run: RunReader, shot: Shot, frame: FrameName, references: Refer
     return {view: share for view, share in shares.items() if math.isfinite(share)}
 
 
-def stored_shares(volume_files: Iterable[Path]) -> dict[Exposure, Shares]:
+def stored_shares(volume_files: Iterable[Path]) -> dict[ExposureKey, Shares]:
     """Those of stored volumes; of older ones, and what nobody can read, nothing."""
-    found: dict[Exposure, Shares] = {}
+    found: dict[ExposureKey, Shares] = {}
     for file in volume_files:
         with suppress(VolumeFileError, ValueError, KeyError), open_volume(file) as volume:
             told = volume.provenance
@@ -66,7 +66,7 @@ def fainter(shares: Shares, settings: ReconstructionSettings) -> float:
     return 1 - math.prod(left) ** (1 if settings.method is ReconstructionMethod.MLOS else 1 / max(len(left), 1))
 
 
-def light_line(shares: Mapping[Exposure, Shares], settings: ReconstructionSettings) -> str:
+def light_line(shares: Mapping[ExposureKey, Shares], settings: ReconstructionSettings) -> str:
     """What is told once of volumes that are compared, or averaged; empty where all had light enough."""
     lost = {exposure: fainter(one, settings) for exposure, one in shares.items()}
     faint = [exposure for exposure in lost if lost[exposure] > MOST_FAINTER]

@@ -53,6 +53,6 @@ class ShotResult(FrozenValue):
         return {(one.shot, one.frame): one.meeting for one in self.volumes if one.meeting}
 
     @property
-    def light(self) -> dict[Exposure, Mapping[str, float]]:
+    def light(self) -> dict[ExposureKey, Mapping[str, float]]:
         """Of its exposures, by view."""
         return {(one.shot, one.frame): one.light_share for one in self.volumes}

@@ -52,7 +52,7 @@ class RunAverage:
     exposures: int
     faults: tuple[Mapping[str, Any], ...]
     seldom: list[int]
-    light: Mapping[Exposure, Shares]
+    light: Mapping[ExposureKey, Shares]
 
 
 def average_run(
@@ -100,7 +100,7 @@ def average_run(
         faults: list[Mapping[str, Any]] = []
         lines, meetings = MeetingLines.of(calibration, tuple(run.header.views)), dict[ExposureKey, Meeting]()
         references = bench.references(run)
-        light = dict[Exposure, Shares]()
+        light = dict[ExposureKey, Shares]()
         exposures = _exposures(run, shots, frame, calibration, settings, references, done, threads, faults, light)
         if lines:
             exposures = _looked_at(exposures, shots, frame, lines, meetings)
@@ -135,7 +135,7 @@ def _exposures(
     done: Callable[[int, int], None],
     threads: int,
     faults: list[Mapping[str, Any]],
-    light: dict[Exposure, Shares],
+    light: dict[ExposureKey, Shares],
 ) -> Exposures:
     """Images of exposure after exposure; ``faults`` gets those that may be wrong, ``light`` the shares of all."""
     before: dict[bytes, int] = {}
