@@ -15,6 +15,7 @@ from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Shadow
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise
 from processing.analysis.droplets.shadows.veiled_shadows import veil_doubts
 from processing.analysis.droplets.verdicts.explained_images import RatioLimits, judged
+from processing.analysis.smeared_views import smear_doubts
 
 LIMITS = RatioLimits(trusted=1.25, refused=2.0)
 """Of discs: overlapping shadows leave something even where all droplets are right. Simulated shots of 28 to 40 droplets
@@ -77,7 +78,8 @@ def judged_by_light(
     limits = COHERENT_LIMITS if (fit.optics.condenser_ratio or FRINGELESS) < FRINGELESS else LIMITS
     verdict, reasons = judged(beside_px, ratio, bare, limits)
     veiled = grey(asked, shadows) or veil_doubts(shot, search, fit)
-    doubts = (*veiled, *light_doubts(fit.light_share, len(fit.discs)))
+    smeared = smear_doubts(asked.images, shadows.transmissions, asked.weights, fit.optics.condenser_ratio)
+    doubts = (*veiled, *smeared, *light_doubts(fit.light_share, len(fit.discs)))
     if doubts and verdict is ShotVerdict.GOOD:
         verdict = ShotVerdict.DOUBTFUL
     return verdict, (*reasons, *doubts)
