@@ -52,7 +52,7 @@ def test_ghosts_are_those_of_all_droplets_whose_probability_is_told() -> None:
     assert told.ghost_share == told_share(np.array([0.8, 1.0]), True)
     assert told.ghost_reason is None
     untold = droplet_statistics([with_p_real(first, 0.8, np.nan), with_p_real(other, np.nan, np.nan)])
-    assert (untold.ghost_share, "of 3 of 4 droplets" in (untold.ghost_reason or "")) == (None, True)
+    assert (untold.ghost_share, "unknown of 3 of 4" in (untold.ghost_reason or "")) == (None, True)
     old = droplet_statistics([first, with_p_real(other, 1.0, 1.0)])
     assert (old.ghost_share, "files from before" in (old.ghost_reason or "")) == (None, True)
 
