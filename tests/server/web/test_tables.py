@@ -87,8 +87,8 @@ def test_a_long_queue_hides_no_work(tmp_path: Path) -> None:
 def test_of_what_was_not_checked_only_how_much_it_is_is_told() -> None:
     """Its sentences are long, and whole on the page Calibrate."""
     long = tuple(f"whether {what} counts the right way" * 4 for what in ("z", "y"))
-    assert told({"cam1": view("good", 0.02)}, long).endswith("good; 2 points not checked, see Calibrate")
-    assert told({"cam1": view("good", 0.02)}, long[:1]).endswith("good; 1 point not checked, see Calibrate")
+    assert told({"cam1": view("good", 0.02)}, long).endswith("good; not checked: 2 things, see Calibrate")
+    assert told({"cam1": view("good", 0.02)}, long[:1]).endswith("good; not checked: 1 thing, see Calibrate")
 
 
 def test_results_of_before_have_no_reasons() -> None:

@@ -126,9 +126,9 @@ def _quality(job: Job) -> str:
     return "; ".join([told, *view.get("reasons", []), *_unchecked(len(result.get("not_checked", [])))])
 
 
-def _unchecked(points: int) -> list[str]:
+def _unchecked(things: int) -> list[str]:
     """How many there are; the page Calibrate has their sentences, which are long."""
-    return [f"{points} point{'s' if points > 1 else ''} not checked, see Calibrate"] if points else []
+    return [f"not checked: {things} thing{'s' if things > 1 else ''}, see Calibrate"] if things else []
 
 
 def _holdout_px(view: dict[str, Any]) -> float:
