@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 Image = NDArray[np.float32]
 
 MOST_WAY_PX = 1.5
-"""In the middle one of the views. Simulated droplets at rest seem to move by 0.1 to 0.7 pixels, by 1.0 in light from all
-directions. Those that move by 1.7 may look as in light of 0.8 apertures, and then seem to move by 2.2 to 2.4."""
+"""In the middle one of the views. Simulated droplets at rest seem to move by 0.1 to 0.7 pixels, by 1.0 in light from
+all directions. Those that move by 1.7 may look as in light of 0.8 apertures, and then seem to move by 2.2 to 2.4."""
 SURE = 5.0
 """Standard deviations by which a way is longer than that."""
 ALONG_A_LINE = 12.0
