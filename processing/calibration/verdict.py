@@ -57,3 +57,8 @@ class Unchecked:
 
     what: str
     state: str
+
+    @property
+    def text(self) -> str:
+        """A line for a person."""
+        return f"not checked: {self.what}; state {self.state}"

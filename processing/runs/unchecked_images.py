@@ -155,5 +155,5 @@ def told_unchecked(unchecked: Iterable[Unchecked], tell: Callable[[str], None]) 
     """Tell people each of them in a line; what programs get."""
     found = list(unchecked)
     for one in found:
-        tell(f"not checked: {one.what}; state {one.state}")
+        tell(one.text)
     return [asdict(one) for one in found]

@@ -65,7 +65,7 @@ class Belonging:
     @property
     def text(self) -> str:
         """A line for a person, and one for whatever cannot be known."""
-        return "\n".join([self._told, *(f"not checked: {one.what}; state {one.state}" for one in self.unchecked)])
+        return "\n".join([self._told, *(one.text for one in self.unchecked)])
 
     @property
     def _told(self) -> str:
