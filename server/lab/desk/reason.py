@@ -28,7 +28,7 @@ class Reason(FrozenModel):
 UNSEEN = Reason(
     code="unseen",
     text="the rig is being looked at",
-    remedy="wait a second; if it stays, a device does not answer: its lamp says which",
+    remedy="wait a second; if it stays, a device or the disk does not answer: its lamp says which",
 )
 """Nobody knows what speaks against a start: a run or a live view has just ended, or a look takes long."""
 
