@@ -15,7 +15,6 @@ from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Shadow
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise
 from processing.analysis.droplets.shadows.veiled_shadows import veil_doubts
 from processing.analysis.droplets.verdicts.explained_images import RatioLimits, judged
-from processing.analysis.smeared_views import smear_doubts
 
 LIMITS = RatioLimits(trusted=1.25, refused=2.0)
 """Of discs: overlapping shadows leave something even where all droplets are right. Simulated shots of 28 to 40 droplets
@@ -29,6 +28,13 @@ LIGHTS = (0.5, 2.0)
 FREE_PERCENTILE = 98
 BLACK, BLACK_PIXELS = 0.2, 10
 """Where discs let less light through than this, images are asked how much they see beyond that, at so many pixels."""
+FREE, BRIGHTER = 0.001, 0.002
+"""Light beyond 1 that counts as none, and as a fringe's: fringes are brighter than the light by up to a fiftieth."""
+LEAST_FRINGES = 0.5
+"""Of those that a light makes. In simulated light of 0.3 to 0.8 apertures 0.87 to 1.15 of them are there; none (-0.1 to
+0.2) where droplets move, or lenses are out of focus, and light of 0.8 apertures explains them best."""
+SURE = 3.0
+"""Standard deviations by which fringes are fewer."""
 MOST_LEFT = 0.04
 """Share of the light that may be left there: diameters are 3 % too small then, and with twice as much ghosts come."""
 MANY_UNLIKE = 1 / 8
@@ -78,8 +84,7 @@ def judged_by_light(
     limits = COHERENT_LIMITS if (fit.optics.condenser_ratio or FRINGELESS) < FRINGELESS else LIMITS
     verdict, reasons = judged(beside_px, ratio, bare, limits)
     veiled = grey(asked, shadows) or veil_doubts(shot, search, fit)
-    smeared = smear_doubts(asked.images, shadows.transmissions, asked.weights, fit.optics.condenser_ratio)
-    doubts = (*veiled, *smeared, *light_doubts(fit.light_share, len(fit.discs)))
+    doubts = (*veiled, *fringe_doubts(asked, shadows), *light_doubts(fit.light_share, len(fit.discs)))
     if doubts and verdict is ShotVerdict.GOOD:
         verdict = ShotVerdict.DOUBTFUL
     return verdict, (*reasons, *doubts)
@@ -105,6 +110,24 @@ def grey(seen: DiscImages, shadows: Shadows) -> tuple[str, ...]:
         f"{100 * share:.0f} % of the light is left where shadows should be black, limit {100 * MOST_LEFT:.0f} %: is a "
         "dark image missing (the camera's black level), are grey values not in proportion to light (gamma), or are "
         "droplets not opaque? Diameters are wrong then",
+    )
+
+
+def fringe_doubts(seen: DiscImages, shadows: Shadows) -> tuple[str, ...]:
+    """What speaks against diameters in a light whose fringes are not there; empty in a light that makes none."""
+    share, weight = 0.0, 0.0
+    for image, drawn, known in zip(seen.images, shadows.transmissions, seen.weights, strict=True):
+        fringes, free = (drawn > 1 + BRIGHTER) & (known > 0), (np.abs(drawn - 1) < FREE) & (known > 0)
+        if fringes.any() and free.any():
+            weighed = (drawn[fringes] - 1) * known[fringes]
+            share += float(weighed @ (image[fringes] - np.mean(image[free])))
+            weight += float(weighed @ (drawn[fringes] - 1))
+    if weight == 0 or share / weight + SURE / np.sqrt(weight) > LEAST_FRINGES:
+        return ()
+    return (
+        f"droplets look as in light from few directions, and {100 * max(share / weight, 0):.0f} % of its fringes are "
+        f"there, limit {100 * LEAST_FRINGES:.0f} %: do they move while the light is on, or are lenses out of focus? "
+        "Diameters may be 10 um too small: shorten the pulses, or state --light gaussian of a lens that is not sharp",
     )
 
 
