@@ -53,9 +53,9 @@ class RunForm:
         templates = TemplateStore(context.services.data_dir / "templates", context.services.events)
         with panel("New run"):
             self._templates = TemplateBar(templates, draft, self._show)
-            self._fields = FormFields(context, draft, self._show_kind)
-            self._chosen = ChosenRuns(context, draft, self._show_kind)
-            self._work = ChosenWork(draft, self._show_kind)
+            self._fields = FormFields(context, draft, self._changed)
+            self._chosen = ChosenRuns(context, draft, self._changed)
+            self._work = ChosenWork(draft, self._changed)
             with ui.expansion("Notes", icon="edit_note", value=True).classes("w-full notes"):
                 self._fields.add_notes()
             self._refusal = ui.label("").classes("refusal").props("role=alert")
@@ -83,6 +83,12 @@ class RunForm:
             self._verdict = verdict
             told_here = [one for one in verdict.reasons if one.code not in _TOLD_ELSEWHERE] if verdict else []
             self._refusal.set_text("\n".join(f"{one.text} ({one.remedy})" for one in told_here))
+
+    def _changed(self) -> None:
+        """Here: what is shown already is not shown again, unless another tab has changed something meanwhile."""
+        if self._draft.version == self._shown + 1:
+            self._shown = self._draft.version
+        self._show_kind()
 
     def _show(self) -> None:
         self._shown = self._draft.version
