@@ -105,6 +105,6 @@ def _fill(link: ui.link, stop: Stop) -> ui.icon:
         ui.icon(stop.icon, size="22px")
         ui.label(stop.title)
         tick = (
-            ui.icon("check_circle", size="14px").classes("rail-tick").props(f'role=img aria-label="done: {stop.done}"')
+            ui.icon("check_circle", size="14px").classes("rail-tick").props(f'aria-label="done: {stop.done}"')
         )
         return tick.tooltip(f"Done: {stop.done}")
