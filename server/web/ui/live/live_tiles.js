@@ -32,7 +32,7 @@ export default {
             </div>
           </div>
           <div :class="['live-caption', { missing: shown[number].missing }]" role="status" :aria-label="view + ' newest shot'">{{ wanted[number].folded ? 'hidden' : shown[number].caption }}</div>
-          <div v-if="full && shown[number].figures && !wanted[number].folded" class="live-figures" role="group" :aria-label="view + ' figures'">
+          <div v-if="full && !wanted[number].folded" :class="['live-figures', { awaited: !shown[number].figures }]" role="group" :aria-label="view + ' figures'">
             <svg class="live-histogram" viewBox="0 0 64 24" preserveAspectRatio="none" role="img" :aria-label="view + ' histogram'">
               <title>Histogram of all pixels, from 0 to full scale; counts are logarithmic</title>
               <line x1="32" x2="32" y1="0" y2="24" class="half" /><path :d="shown[number].histogram" />
@@ -40,9 +40,9 @@ export default {
             </svg>
             <div class="live-level" :title="'Light: the grey value that a tenth of all pixels exceeds. The mark is half of the range, where the paper sets the background'">
               <div class="live-bar"><i :class="shown[number].near ? 'near' : 'far'" :style="{ width: shown[number].light + '%' }"></i><b></b></div>
-              <span>light {{ shown[number].light.toFixed(0) }} % <small>of range, half is the aim</small></span>
+              <span>light {{ shown[number].light?.toFixed(0) }} % <small>of range, half is the aim</small></span>
             </div>
-            <span :class="{ alert: shown[number].saturated }" title="Pixels at the largest grey value of the sensor">saturated {{ shown[number].figures.saturated_percent.toFixed(2) }} %</span>
+            <span :class="{ alert: shown[number].saturated }" title="Pixels at the largest grey value of the sensor">saturated {{ shown[number].figures?.saturated_percent.toFixed(2) }} %</span>
             <div class="live-focus" title="Steepest edges: change of the grey value per pixel, in percent of the light. Higher is sharper; the line shows how it went">
               <svg viewBox="0 0 80 20" preserveAspectRatio="none" role="img" :aria-label="view + ' focus trend'"><path :d="shown[number].trend" /></svg>
               <span>{{ shown[number].focus }}</span>
