@@ -104,7 +104,5 @@ def _fill(link: ui.link, stop: Stop) -> ui.icon:
     with link.props(f'aria-label="{stop.title}"'):
         ui.icon(stop.icon, size="22px")
         ui.label(stop.title)
-        tick = (
-            ui.icon("check_circle", size="14px").classes("rail-tick").props(f'aria-label="done: {stop.done}"')
-        )
+        tick = ui.icon("check_circle", size="14px").classes("rail-tick").props(f'aria-label="done: {stop.done}"')
         return tick.tooltip(f"Done: {stop.done}")
