@@ -1,9 +1,7 @@
 """What is wrong with the images of an exposure, so that its volume may look fine and be none: told with the volume."""
 
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,9 +9,9 @@ import numpy as np
 from daq.files.run_directory import RunReader, Shot
 from processing.light import DIM_LIGHT, hollowed, odd_light
 from processing.preprocessing import Frame, Intensity, is_dim
-from processing.reconstruction.volume_file import open_volume
 from processing.runs.errors import PipelineError
 from processing.runs.results_file import FrameName
+from processing.runs.stored_exposures import StoredExposure
 from processing.runs.workbench import References
 
 Faults = Mapping[str, tuple[str, ...] | Mapping[str, str]]
@@ -56,21 +54,14 @@ def images_print(shot: Shot, frames: Sequence[FrameName]) -> bytes:
     return hashlib.blake2b(b"".join(one.tobytes() for one in rows), digest_size=16).digest()
 
 
-def stored_faults(volume_file: Path, copy_of: Path | None = None) -> Mapping[str, Any]:
+def stored_faults(exposure: StoredExposure, copy_of: StoredExposure | None = None) -> Mapping[str, Any]:
     """Shot and faults of a stored volume, and the shot of another one that has its voxels; empty if it tells none."""
-    with open_volume(volume_file) as volume:
-        told = {name: json.loads(str(volume.provenance[name])) for name in FAULTS if name in volume.provenance}
-        if volume.lost_share > MOST_LOST:
-            told["lost_share"] = volume.lost_share
-        if copy_of:
-            told["copy_of"] = _shot_of(copy_of)
-        return {"shot": _shot_of(volume_file), **told} if told else {}
-
-
-def _shot_of(volume_file: Path) -> Any:
-    """Index of a shot, as its volume has it; the name of one that does not say."""
-    with open_volume(volume_file) as volume:
-        return volume.provenance.get("shot", volume_file.name)
+    told = {name: exposure.table(name) for name in FAULTS if name in exposure.provenance}
+    if exposure.lost_share > MOST_LOST:
+        told["lost_share"] = exposure.lost_share
+    if copy_of:
+        told["copy_of"] = copy_of.shot
+    return {"shot": exposure.shot, **told} if told else {}
 
 
 def fault_lines(faults: Mapping[str, Any]) -> list[str]:

@@ -17,6 +17,8 @@ SETTINGS_FILE = "settings.json"
 LATER_FIELDS = ("run_created_utc",)
 """Of a provenance; results from before lack it. Two runs may have one name: imports are called as their folders."""
 FrameName = Literal["a", "b"]
+ExposureKey = tuple[int, FrameName]
+"""Shot and exposure."""
 Provenance = Mapping[str, str | int | float]
 
 

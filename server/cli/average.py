@@ -89,12 +89,12 @@ def _average_results(options: Namespace) -> dict[str, Any]:
             f"{options.results}: there are no volumes of exposure {options.exposure.upper()} to average; the server "
             "keeps previews: name the run and its --calibration"
         )
-    volume, grid, copies = average_volumes(files)
-    mean = MeanVolume.of(volume)
-    told = [told for file in files if (told := stored_faults(file, copies.get(file)))]
-    faults = with_odd(told, stored_meetings(files))
-    light = light_line(stored_shares(files), stored_settings(files[0]))
-    if (belonging := stored_belonging(files)) is None:
+    averaged = average_volumes(files)
+    mean, grid, exposures = MeanVolume.of(averaged.mean), averaged.grid, averaged.exposures
+    told = [told for one in exposures if (told := stored_faults(one, averaged.copies.get(one.file)))]
+    faults = with_odd(told, stored_meetings(exposures))
+    light = light_line(stored_shares(exposures), stored_settings(exposures[0]))
+    if (belonging := stored_belonging(exposures)) is None:
         return {**_written(options, mean, grid, len(files), faults, {}), "light": light}
     if belonging["verdict"] in ("warn", "refuse"):
         progress(f"{options.results}: droplets speak against calibration and run: {belonging['verdict']}")

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Mapping
 
     from processing.reconstruction.settings import ReconstructionSettings
-    from processing.runs.shots.meetings import ExposureKey
+    from processing.runs.results_file import ExposureKey
     from processing.runs.shots.shot_result import ShotResult
 
 NAME = "reconstruct"
@@ -129,6 +129,7 @@ def _reconstruct_shots(
     from processing.calibration.calibration_file import load_calibration
     from processing.runs.results_file import volume_files
     from processing.runs.shots.meetings import pale_views, seldom_meeting, stored_meetings
+    from processing.runs.stored_exposures import stored_exposures
     from processing.runs.volumes.pipeline import Options, reconstruct_shots
 
     calibration = load_calibration(options.calibration)
@@ -152,7 +153,8 @@ def _reconstruct_shots(
             shots.append(shot)
     made = {volume.file for shot in shots for volume in shot.volumes}
     others = [file for file in volume_files(out) if file.name not in made][-MOST_COMPARED:]
-    meetings = stored_meetings(others) | {key: one for shot in shots for key, one in shot.meetings.items()}
+    meetings = stored_meetings(stored_exposures(others))
+    meetings |= {key: one for shot in shots for key, one in shot.meetings.items()}
     pale, seldom = pale_views(meetings), [shot for shot in seldom_meeting(meetings) if shot in indices]
     return [_with_pale(shot, pale) for shot in shots], ask_seldom(belonging(), seldom, run_dir, calibration)
 

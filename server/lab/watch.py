@@ -17,7 +17,8 @@ from pydantic import Field
 from daq.frozen_model import FrozenModel
 from processing.analysis.near_or_far import SIGHTS, added, doubts_of
 from processing.calibration.verdict import Verdict
-from processing.runs.shots.meetings import ExposureKey, Meeting, meetings_of, pale_views, seldom_meeting
+from processing.runs.results_file import ExposureKey
+from processing.runs.shots.meetings import Meeting, meetings_of, pale_views, seldom_meeting
 from processing.runs.shots.shot_check import ALARM_PX, STOP_PX
 from processing.runs.workbench import Latest
 from server.lab.events import EventPublisher

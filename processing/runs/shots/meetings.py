@@ -6,15 +6,14 @@ rig to rig. So each keeps its figures, which cost a hundredth of a second, and t
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
 from processing.reconstruction.settings import FrozenValue
-from processing.reconstruction.volume_file import VolumeFileError, open_volume
-from processing.runs.results_file import FrameName
+from processing.runs.results_file import ExposureKey
+from processing.runs.stored_exposures import StoredExposure
 
 MEETING = "meeting"
 """Of a stored volume: what its exposure is compared with others by; a JSON table."""
@@ -45,8 +44,6 @@ class Meeting(FrozenValue):
     errors: Annotated[Mapping[str, float], Field(description="standard deviations of these by chance")] = {}
 
 
-ExposureKey = tuple[int, FrameName]
-"""Shot and exposure."""
 Meetings = Mapping[ExposureKey, Meeting]
 
 
@@ -56,14 +53,12 @@ def meetings_of(volumes: list[dict[str, Any]]) -> dict[ExposureKey, Meeting]:
     return {(one["shot"], one["frame"]): Meeting.model_validate(one["meeting"]) for one in told}
 
 
-def stored_meetings(volume_files: Iterable[Path]) -> dict[ExposureKey, Meeting]:
+def stored_meetings(exposures: Iterable[StoredExposure]) -> dict[ExposureKey, Meeting]:
     """What the exposures of stored volumes are compared by; of older ones, and what nobody can read, nothing."""
     found: dict[ExposureKey, Meeting] = {}
-    for file in volume_files:
-        with suppress(VolumeFileError, ValueError, KeyError), open_volume(file) as volume:
-            told = volume.provenance
-            frame: FrameName = "b" if told["frame"] == "b" else "a"
-            found[int(told["shot"]), frame] = Meeting.model_validate_json(str(told[MEETING]))
+    for one in exposures:
+        with suppress(ValueError, KeyError):
+            found[one.key] = Meeting.model_validate(one.table(MEETING))
     return found
 
 

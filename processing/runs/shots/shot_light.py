@@ -3,20 +3,17 @@
 Droplets are measured against the light around them, and do not care. Values of volumes do: MLOS multiplies the views.
 """
 
-import json
 import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from pathlib import Path
 
 from daq.files.run_directory import RunReader, Shot
 from processing.light import light_share
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.reconstruction.volume_file import VolumeFileError, open_volume
 from processing.runs.exposure_faults import grey_values
-from processing.runs.results_file import FrameName
-from processing.runs.shots.meetings import ExposureKey
+from processing.runs.results_file import ExposureKey, FrameName
+from processing.runs.stored_exposures import StoredExposure
 from processing.runs.workbench import References
 
 LIGHT_SHARE = "light_share"
@@ -37,21 +34,19 @@ def light_shares(run: RunReader, shot: Shot, frame: FrameName, references: Refer
     return {view: share for view, share in shares.items() if math.isfinite(share)}
 
 
-def stored_shares(volume_files: Iterable[Path]) -> dict[ExposureKey, Shares]:
+def stored_shares(exposures: Iterable[StoredExposure]) -> dict[ExposureKey, Shares]:
     """Those of stored volumes; of older ones, and what nobody can read, nothing."""
     found: dict[ExposureKey, Shares] = {}
-    for file in volume_files:
-        with suppress(VolumeFileError, ValueError, KeyError), open_volume(file) as volume:
-            told = volume.provenance
-            frame: FrameName = "b" if told["frame"] == "b" else "a"
-            found[int(told["shot"]), frame] = json.loads(str(told[LIGHT_SHARE]))
+    for one in exposures:
+        with suppress(ValueError, KeyError):
+            found[one.key] = one.table(LIGHT_SHARE)
     return found
 
 
-def stored_settings(volume_file: Path) -> ReconstructionSettings:
+def stored_settings(exposure: StoredExposure) -> ReconstructionSettings:
     """How a volume was made; by default, where it does not say."""
-    with suppress(VolumeFileError, ValueError, KeyError), open_volume(volume_file) as volume:
-        return ReconstructionSettings.model_validate_json(str(volume.provenance["settings"]))
+    with suppress(ValueError, KeyError):
+        return ReconstructionSettings.model_validate_json(str(exposure.provenance["settings"]))
     return ReconstructionSettings()
 
 

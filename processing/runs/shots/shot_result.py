@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.planned_view import PlannedView
 from processing.reconstruction.settings import FrozenValue, GridSettings
-from processing.runs.results_file import FrameName
-from processing.runs.shots.meetings import ExposureKey, Meeting
+from processing.runs.results_file import ExposureKey, FrameName
+from processing.runs.shots.meetings import Meeting
 
 
 class VolumeRecord(FrozenValue):

@@ -16,9 +16,9 @@ from processing.reconstruction.planning.calibrated_plan import plan_of
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.exposure_faults import copied, exposure_faults
-from processing.runs.results_file import FrameName
+from processing.runs.results_file import ExposureKey, FrameName
 from processing.runs.shots.meeting_lines import MeetingLines
-from processing.runs.shots.meetings import ExposureKey, Meeting, seldom_meeting, with_odd
+from processing.runs.shots.meetings import Meeting, seldom_meeting, with_odd
 from processing.runs.shots.shot_images import require_match, shot_intensities
 from processing.runs.shots.shot_light import Shares, light_shares
 from processing.runs.workbench import References, Workbench

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,16 +11,37 @@ import numpy as np
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import StoredVolume, VolumeFileError, open_volume
 from processing.runs.results_file import LATER_FIELDS, Provenance, volume_path
+from processing.runs.stored_exposures import StoredExposure
 from processing.volume import VoxelGrid
 
 COPIED_PLANES = 8
 """Every so many planes are asked whether a volume is a copy: noise never repeats."""
 
 
-def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid, dict[Path, Path]]:
-    """Mean of volumes on one grid, and which of them has the very voxels of which one before it.
+@dataclass(frozen=True, eq=False)
+class StoredAverage:
+    """The mean of stored volumes.
 
-    Of empty ones nothing is said: they are all alike.
+    Parameters
+    ----------
+    mean : (z, y, x) float32 array
+        Intensities.
+    grid : VoxelGrid
+        Where its voxels lie.
+    exposures : tuple of StoredExposure
+        What each of the volumes tells.
+    copies : mapping of Path to StoredExposure
+        By file, the volume before it that has its very voxels; of empty ones nothing is said: they are all alike.
+    """
+
+    mean: Intensity
+    grid: VoxelGrid
+    exposures: tuple[StoredExposure, ...]
+    copies: Mapping[Path, StoredExposure]
+
+
+def average_volumes(files: list[Path]) -> StoredAverage:
+    """Mean of volumes on one grid.
 
     Raises
     ------
@@ -33,8 +55,9 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid, dict[Path,
         grid, made_by = first.grid, _made_by(first.provenance)
     total = np.zeros(grid.shape, np.float32)
     counted: dict[str, Path] = {}
-    seen: dict[bytes, Path] = {}
-    copies: dict[Path, Path] = {}
+    exposures: list[StoredExposure] = []
+    seen: dict[bytes, StoredExposure] = {}
+    copies: dict[Path, StoredExposure] = {}
     for file in files:
         with open_volume(file) as volume:
             if volume.grid != grid:
@@ -45,10 +68,11 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid, dict[Path,
                 raise VolumeFileError(f"{file}: the same exposure as {first_file.name}; it would count twice")
             if (called := _own_name(volume.provenance)) not in ("", file.name):
                 raise VolumeFileError(f"{file}: was renamed, and is {called}: another shot, or another exposure")
-            if (voxels := _added(volume, total)) and (first_file := seen.setdefault(voxels, file)) != file:
-                copies[file] = first_file
+            exposures.append(exposure := StoredExposure.of(volume))
+            if (voxels := _added(volume, total)) and (first_seen := seen.setdefault(voxels, exposure)) is not exposure:
+                copies[file] = first_seen
     total /= np.float32(len(files))
-    return total, grid, copies
+    return StoredAverage(total, grid, tuple(exposures), copies)
 
 
 def _added(volume: StoredVolume, total: Intensity) -> bytes:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from processing.calibration.calibration import Calibration
     from processing.calibration.verdict import Unchecked
     from processing.runs.shots.shot_check import ShotCheck
+    from processing.runs.stored_exposures import StoredExposure
     from processing.runs.workbench import Workbench
 
 
@@ -78,15 +79,11 @@ class Belonging:
         return "do run and calibration belong together? " + "; ".join(check_line(check) for check in told)
 
 
-def stored_belonging(files: "Sequence[Path]") -> dict[str, Any] | None:
+def stored_belonging(exposures: "Sequence[StoredExposure]") -> dict[str, Any] | None:
     """The worst record that volumes carry; None where none of them tells anything."""
     from processing.calibration.verdict import BELONGING, Verdict
-    from processing.reconstruction.volume_file import open_volume
 
-    records = []
-    for file in files:
-        with open_volume(file) as volume:
-            records.append(json.loads(str(volume.provenance.get(BELONGING, "{}"))))
+    records = [one.table(BELONGING) for one in exposures if BELONGING in one.provenance]
     told = [record for record in records if record.get("verdict")]
     return max(told, key=lambda record: list(Verdict).index(record["verdict"]), default=None)
 

@@ -28,6 +28,7 @@ from processing.runs.results_file import claim_results, volume_files, volume_pat
 from processing.runs.shots.shot_images import shot_intensities
 from processing.runs.shots.shot_light import fainter, light_line, stored_settings, stored_shares
 from processing.runs.shots.shot_result import ShotResult
+from processing.runs.stored_exposures import stored_exposures
 from processing.runs.volumes.pipeline import reconstruct_shot, reconstruct_shots
 from processing.runs.volumes.stored_average import average_volumes
 from processing.runs.workbench import Workbench
@@ -212,8 +213,8 @@ def test_the_light_of_a_shot_is_kept_with_its_volume_and_told_where_values_are_c
     )
     assert [dict(one) for one in dim.light.values()] == 2 * [dict.fromkeys(cameras(), 0.8)]
     assert [dict(one) for one in bright.light.values()] == 2 * [dict.fromkeys(cameras(), 1.0)]
-    files = volume_files(tmp_path / "250" / "results")
-    assert (stored_shares(files), stored_settings(files[0])) == (dim.light, settings)
+    exposures = stored_exposures(volume_files(tmp_path / "250" / "results"))
+    assert (stored_shares(exposures), stored_settings(exposures[0])) == (dim.light, settings)
     seen = [tmp_path / counts / "results" / "shot_00000_a.vtkhdf" for counts in ("200", "250")]
     brightest = [float(read_volume(file)[0].max()) for file in seen]
     assert fainter(dim.light[0, "a"], settings) == pytest.approx(1 - brightest[1] / brightest[0], abs=0.04)
@@ -299,9 +300,10 @@ def test_results_id_tells_settings_and_calibrations_apart() -> None:
 def test_the_average_is_the_mean(run_dir: Path, calibration_file: Path, voxels: VoxelType) -> None:
     reconstructed(run_dir, calibration_file, SETTINGS.model_copy(update={"voxels": voxels}))
     files = volume_files(run_dir / "results")
-    mean, grid, copies = average_volumes(files)
-    assert (grid, copies) == (GRID, {})
-    np.testing.assert_allclose(mean, (read_volume(files[0])[0] + read_volume(files[1])[0]) / 2, atol=1e-7)
+    averaged = average_volumes(files)
+    assert (averaged.grid, averaged.copies) == (GRID, {})
+    assert [one.key for one in averaged.exposures] == [(0, "a"), (0, "b")]
+    np.testing.assert_allclose(averaged.mean, (read_volume(files[0])[0] + read_volume(files[1])[0]) / 2, atol=1e-7)
 
 
 @pytest.mark.parametrize(("value", "said"), [(np.nan, "infinite, or not a number"), (-1, "negative")])

@@ -10,7 +10,8 @@ import pytest
 
 from processing.calibration.calibration_file import save_calibration
 from processing.reconstruction.volume_file import read_volume
-from processing.runs.shots.meetings import ExposureKey, Meeting, pale_views, seldom_meeting
+from processing.runs.results_file import ExposureKey
+from processing.runs.shots.meetings import Meeting, pale_views, seldom_meeting
 from processing.synthetic.stamping import FloatImage
 from server.cli.main import main
 from tests.support.command_line import told
