@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from daq.files.run_directory import RunReader, Shot
+from daq.files.run_directory import Shot
 from processing.light import DIM_LIGHT, hollowed, odd_light
-from processing.preprocessing import Frame, Intensity, is_dim
-from processing.runs.errors import PipelineError
+from processing.preprocessing import Intensity, Polarity, is_dim
 from processing.runs.results_file import FrameName
+from processing.runs.seen_views import SeenView, grey_values, other_backgrounds
 from processing.runs.stored_exposures import StoredExposure
-from processing.runs.workbench import References
 
 Faults = Mapping[str, tuple[str, ...] | Mapping[str, str]]
 COPIED_ROWS = 16
@@ -22,15 +21,12 @@ MOST_LOST = 0.01
 """Of the sum of all intensities, in voxels that were too faint for bytes."""
 
 
-def exposure_faults(
-    run: RunReader, shot: Shot, frame: FrameName, images: Sequence[Intensity], references: References
-) -> Faults:
+def exposure_faults(seen: Mapping[str, SeenView], polarity: Polarity, images: Sequence[Intensity]) -> Faults:
     """Views that see nothing, that are dim, and whose light is odd; as ``VolumeRecord`` keeps them."""
-    bits = {view: run.header.views[view].bits for view in shot.views}
     return {
-        "blind_views": tuple(view for view, image in zip(shot.views, images, strict=True) if not image.any()),
-        "dim_views": tuple(view for view in bits if is_dim(grey_values(shot, view, frame), bits[view])),
-        "odd_light": odd_lights(run, shot, frame, references, images),
+        "blind_views": tuple(view for view, image in zip(seen, images, strict=True) if not image.any()),
+        "dim_views": tuple(view for view, one in seen.items() if is_dim(one.grey, one.bits)),
+        "odd_light": odd_lights(seen, polarity, images),
     }
 
 
@@ -81,31 +77,14 @@ def fault_lines(faults: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def grey_values(shot: Shot, view: str, frame: FrameName) -> Frame:
-    """Pixels of an exposure as they were recorded; PipelineError if it is missing."""
-    exposures = shot.views[view]
-    pixels = exposures.frame_a if frame == "a" else exposures.frame_b
-    if pixels is None:
-        raise PipelineError(f"shot {shot.index}: {view} has no exposure {frame}")
-    return pixels
-
-
-def other_backgrounds(references: References, view: str, frame: FrameName) -> dict[str, Intensity]:
-    """Backgrounds that may be exchanged with that of a view, and what they are called."""
-    backgrounds = {name: background for name, (_, background) in references.items() if name != view}
-    return {f"that of {name}": one["ab".index(frame)] for name, one in backgrounds.items() if one is not None}
-
-
 def odd_lights(
-    run: RunReader, shot: Shot, frame: FrameName, references: References, images: Sequence[Intensity] | None = None
+    seen: Mapping[str, SeenView], polarity: Polarity, images: Sequence[Intensity] | None = None
 ) -> dict[str, str]:
     """What is odd with the light of an exposure, by view; see ``odd_light``, and with its images ``hollowed``."""
-    said, polarity = {}, run.header.polarity
-    for number, view in enumerate(shot.views):
-        dark, background = (None if one is None else one["ab".index(frame)] for one in references[view])
-        grey, bits = grey_values(shot, view, frame), run.header.views[view].bits
-        others = other_backgrounds(references, view, frame)
-        said[view] = odd_light(grey, polarity, bits=bits, dark=dark, background=background, others=others)
+    said = {}
+    for number, (view, one) in enumerate(seen.items()):
+        bits, dark, background, others = one.bits, one.dark, one.background, other_backgrounds(seen, view)
+        said[view] = odd_light(one.grey, polarity, bits=bits, dark=dark, background=background, others=others)
         if images is not None and not said[view]:
-            said[view] = hollowed(grey, images[number], polarity, bits=bits, dark=dark, background=background)
+            said[view] = hollowed(one.grey, images[number], polarity, bits=bits, dark=dark, background=background)
     return {view: what for view, what in said.items() if what}

@@ -14,8 +14,8 @@ from daq.files.run_directory import RunReader, Shot
 from processing.light import odd_background
 from processing.preprocessing import Intensity, transmission
 from processing.runs.errors import PipelineError
-from processing.runs.exposure_faults import grey_values, other_backgrounds
 from processing.runs.results_file import FrameName
+from processing.runs.seen_views import other_backgrounds, seen_views
 from processing.runs.workbench import References
 
 _PATTERN = r"^([^=]+)=(\d+):(\d+),(\d+):(\d+)$"
@@ -26,12 +26,11 @@ IgnoredPixels = Annotated[str, Field(pattern=_PATTERN)]
 def bright_images(run: RunReader, shot: Shot, frame: FrameName, references: References) -> list[Intensity]:
     """Images of one exposure less dark, over the full scale; not clipped, so that noise can be judged."""
     images = []
-    for view in shot.views:
-        dark = references[view][0]
-        grey = grey_values(shot, view, frame).astype(np.float32)
-        if dark is not None:
-            grey -= dark["ab".index(frame)]
-        images.append(grey / np.float32(2 ** run.header.views[view].bits - 1))
+    for one in seen_views(run, shot, frame, references).values():
+        grey = one.grey.astype(np.float32)
+        if one.dark is not None:
+            grey -= one.dark
+        images.append(grey / np.float32(2**one.bits - 1))
     return images
 
 
@@ -39,26 +38,23 @@ def shadow_images(
     run: RunReader, shot: Shot, frame: FrameName, references: References
 ) -> tuple[list[Intensity], list[Intensity]]:
     """Transmissions of one exposure by the run's own backgrounds, and how sure each pixel is."""
-    number, images, trust = "ab".index(frame), [], []
-    for view in shot.views:
-        dark, background = references[view]
-        if background is None:
+    images, trust = [], []
+    for view, one in seen_views(run, shot, frame, references).items():
+        if one.background is None:
             raise PipelineError(_no_background(run, view))
-        level = np.float32(0) if dark is None else dark[number]
-        grey = grey_values(shot, view, frame).astype(np.float32)
-        image, sure = transmission(grey, level, background[number], bits=run.header.views[view].bits)
+        level = np.float32(0) if one.dark is None else one.dark
+        image, sure = transmission(one.grey.astype(np.float32), level, one.background, bits=one.bits)
         images.append(image)
         trust.append(sure)
     return images, trust
 
 
-def odd_backgrounds(shot: Shot, frame: FrameName, references: References) -> tuple[str, ...]:
+def odd_backgrounds(run: RunReader, shot: Shot, frame: FrameName, references: References) -> tuple[str, ...]:
     """What speaks against the backgrounds of an exposure of shadows, by view: that they show it, or are another's."""
-    number, told = "ab".index(frame), []
-    for view in shot.views:
-        dark, background = (None if one is None else one[number] for one in references[view])
-        others = other_backgrounds(references, view, frame)
-        if background is not None and (odd := odd_background(grey_values(shot, view, frame), background, dark, others)):
+    seen, told = seen_views(run, shot, frame, references), []
+    for view, one in seen.items():
+        others = other_backgrounds(seen, view)
+        if one.background is not None and (odd := odd_background(one.grey, one.background, one.dark, others)):
             told.append(f"{view} {odd}")
     return tuple(told)
 

@@ -23,6 +23,7 @@ from processing.runs.errors import PipelineError
 from processing.runs.exposure_faults import odd_lights
 from processing.runs.manifest.importing import CALIBRATION_FOLDER, RUN_FOLDER
 from processing.runs.results_file import FrameName
+from processing.runs.seen_views import seen_views
 from processing.runs.shots.agreeing_shots import corrected_by
 from processing.runs.shots.shot_check import Exposure, ShotCheck, check_shots
 from processing.runs.shots.shot_images import shot_intensities
@@ -80,7 +81,7 @@ def odd_images(run_dir: Path, shot: int, workbench: Workbench) -> tuple[str, ...
     with workbench.occupied() as bench, RunReader(run_dir) as run:
         recorded, references = run.read_shot(shot), bench.references(run)
         frames = _FRAMES[: run.header.frames_per_shot]
-        odd = {frame: odd_lights(run, recorded, frame, references) for frame in frames}
+        odd = {frame: odd_lights(seen_views(run, recorded, frame, references), run.header.polarity) for frame in frames}
     return tuple(f"exposure {frame}: {view} {what}" for frame, said in odd.items() for view, what in said.items())
 
 

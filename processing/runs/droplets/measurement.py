@@ -242,4 +242,4 @@ class RunMeasurement:
             threads=threads,
             before_round=before_round,
         )
-        return measured, [1 - one for one in images], odd_backgrounds(shot, frame, self.references)
+        return measured, [1 - one for one in images], odd_backgrounds(self.run, shot, frame, self.references)

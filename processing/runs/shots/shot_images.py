@@ -8,8 +8,8 @@ from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, intensity
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError
-from processing.runs.exposure_faults import grey_values
 from processing.runs.results_file import FrameName
+from processing.runs.seen_views import grey_values
 from processing.runs.workbench import References, read_references
 
 

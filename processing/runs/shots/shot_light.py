@@ -7,14 +7,13 @@ import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 
-from daq.files.run_directory import RunReader, Shot
 from processing.light import light_share
+from processing.preprocessing import Polarity
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.runs.exposure_faults import grey_values
-from processing.runs.results_file import ExposureKey, FrameName
+from processing.runs.results_file import ExposureKey
+from processing.runs.seen_views import SeenView
 from processing.runs.stored_exposures import StoredExposure
-from processing.runs.workbench import References
 
 LIGHT_SHARE = "light_share"
 """Of a stored volume: by view, the share of its background's light; a JSON table."""
@@ -23,14 +22,13 @@ MOST_FAINTER = 0.1
 Shares = Mapping[str, float]
 
 
-def light_shares(run: RunReader, shot: Shot, frame: FrameName, references: References) -> Shares:
+def light_shares(seen: Mapping[str, SeenView], polarity: Polarity) -> Shares:
     """By view, as ``light_share`` has it; nothing of bright particles, and of views without a background."""
-    shares = {}
-    for view in shot.views if run.header.polarity == "shadow" else ():
-        dark, background = (None if one is None else one["ab".index(frame)] for one in references[view])
-        if background is not None:
-            grey, bits = grey_values(shot, view, frame), run.header.views[view].bits
-            shares[view] = round(light_share(grey, background, bits=bits, dark=dark), 3)
+    shares = {
+        view: round(light_share(one.grey, one.background, bits=one.bits, dark=one.dark), 3)
+        for view, one in seen.items()
+        if polarity == "shadow" and one.background is not None
+    }
     return {view: share for view, share in shares.items() if math.isfinite(share)}
 
 

@@ -14,8 +14,8 @@ from processing.calibration.calibration_file import file_sha256
 from processing.image_file import read_image
 from processing.preprocessing import Intensity
 from processing.runs.errors import PipelineError
-from processing.runs.exposure_faults import grey_values
 from processing.runs.results_file import Provenance
+from processing.runs.seen_views import grey_values
 from processing.runs.shots.shot_images import frame_names
 from processing.runs.workbench import read_references
 

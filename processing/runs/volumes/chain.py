@@ -16,6 +16,7 @@ from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import METHOD_VERSION, ReconstructionSettings
 from processing.runs.exposure_faults import Faults, exposure_faults
 from processing.runs.results_file import FrameName, Provenance, provenance_of
+from processing.runs.seen_views import seen_views
 from processing.runs.shots.meeting_lines import MeetingLines
 from processing.runs.shots.meetings import Meeting
 from processing.runs.shots.read_ahead import read_ahead
@@ -140,8 +141,8 @@ class Chain:
                 run, shot, frame, self.settings, memory, references=references, threads=self.threads
             )
             meeting = self.lines.meeting(images) if self.lines else None
-            faults = exposure_faults(run, shot, frame, images, references)
-            light = light_shares(run, shot, frame, references)
+            seen, polarity = seen_views(run, shot, frame, references), run.header.polarity
+            faults, light = exposure_faults(seen, polarity, images), light_shares(seen, polarity)
             yield Exposure(index, frame, images, faults, meeting, light)
 
 

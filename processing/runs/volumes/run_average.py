@@ -17,6 +17,7 @@ from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.exposure_faults import copied, exposure_faults
 from processing.runs.results_file import ExposureKey, FrameName
+from processing.runs.seen_views import seen_views
 from processing.runs.shots.meeting_lines import MeetingLines
 from processing.runs.shots.meetings import Meeting, seldom_meeting, with_odd
 from processing.runs.shots.shot_images import require_match, shot_intensities
@@ -143,13 +144,11 @@ def _exposures(
         shot = run.read_shot(index, "a" if frame == "a" else "ab")
         require_match(run.header.run_id, shot, calibration)
         images = shot_intensities(run, shot, frame, settings, references=references, threads=threads)
-        found: dict[str, Any] = {
-            **exposure_faults(run, shot, frame, images, references),
-            **copied(shot, frame, images, before),
-        }
+        seen, polarity = seen_views(run, shot, frame, references), run.header.polarity
+        found: dict[str, Any] = {**exposure_faults(seen, polarity, images), **copied(shot, frame, images, before)}
         if told := {name: what for name, what in found.items() if what or name == "copy_of"}:
             faults.append({"shot": index, **told})
-        light[index, frame] = light_shares(run, shot, frame, references)
+        light[index, frame] = light_shares(seen, polarity)
         yield images
         done(count, len(shots))
 

@@ -17,8 +17,8 @@ def test_what_a_volume_tells_is_known_without_its_file_and_what_nobody_can_read_
     files = [volume_path(tmp_path, shot, "b") for shot in range(3)]
     tables = {MEETING: '{"droplets": 7}', LIGHT_SHARE: '{"view1": 0.8}', "dim_views": '["view1"]'}
     grid = VoxelGrid.centred((2, 2, 2), 0.1)
-    for file, told in ((files[0], {"shot": 0, "frame": "b", **tables}), (files[1], {"shot": 1, "frame": "b"})):
-        write_volume(file, np.ones(grid.shape, np.float32), grid, told)
+    for shot, told in enumerate((tables, {})):
+        write_volume(files[shot], np.ones(grid.shape, np.float32), grid, {"shot": shot, "frame": "b", **told})
     files[2].write_bytes(b"torn")
     first, second = stored_exposures(files)
     for file in files:
