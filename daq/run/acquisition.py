@@ -258,8 +258,8 @@ class Acquisition:
         yield from not_acknowledged(status)
 
     def _preflight(self) -> Preflight:
-        margin_bytes = self._limits.disk_margin_bytes
-        return Preflight(self._rig, self._data_dir, self._hash_calibration, margin_bytes, self._folder)
+        margin_bytes, hash_of = self._limits.disk_margin_bytes, self._hash_calibration
+        return Preflight(self._rig, self._data_dir, self._configuration, hash_of, margin_bytes, self._folder)
 
     def _shooting(self, plan: RunPlan, timing: ShotTiming, ending: RunEnding) -> Shooting:
         return Shooting(self._rig, plan, timing, self._progress, self._limits, self._observers, ending)
@@ -282,7 +282,7 @@ class Acquisition:
     def _prepare(self, plan: RunPlan) -> tuple[PreparedRun, RunWriter]:
         """Check the plan, and make the directory of the run: a run that is accepted always has one."""
         try:
-            prepared = self._preflight().prepare(plan, self._configuration)
+            prepared = self._preflight().prepare(plan)
             self._end_live_before(RunStep.START, "a run starts")
             return prepared, RunWriter(prepared.run_dir, prepared.header, self._limits.disk_margin_bytes).open()
         except (StorageError, OSError) as error:

@@ -57,6 +57,8 @@ class Preflight:
         Open devices.
     data_dir : Path
         Where run directories are made.
+    configuration : Mapping[str, Any]
+        The resolved configuration of the rig, which every run keeps.
     hash_calibration : Callable[[str], str | None]
         SHA-256 of a calibration by its id.
     disk_margin_bytes : int
@@ -67,6 +69,7 @@ class Preflight:
 
     rig: Rig
     data_dir: Path
+    configuration: Mapping[str, Any]
     hash_calibration: Callable[[str], str | None]
     disk_margin_bytes: int
     folder: tuple[int, int] | None = None
@@ -81,10 +84,10 @@ class Preflight:
     def refusals_of_plan(self, plan: RunPlan) -> Iterator[DaqError]:
         """Why this plan cannot run on this rig; no device is asked."""
         yield from self._refusals_of_numbers(plan)
-        yield from refused(RefusalCode.REFERENCES, find_references, self.data_dir, plan, self.views)
+        yield from refused(RefusalCode.REFERENCES, self.references, plan)
         yield from refused(RefusalCode.STORAGE, self.calibration_sha256, plan)
 
-    def prepare(self, plan: RunPlan, configuration: Mapping[str, Any]) -> PreparedRun:
+    def prepare(self, plan: RunPlan) -> PreparedRun:
         """Describe a run that nothing speaks against.
 
         Raises
@@ -96,16 +99,20 @@ class Preflight:
         self.data_dir.mkdir(parents=True, exist_ok=True)
         raise_first(self._refusals_of_numbers(plan))
         with refusing(RefusalCode.REFERENCES):
-            references = find_references(self.data_dir, plan, self.views)
+            references = self.references(plan)
         with refusing(RefusalCode.STORAGE):
             calibration_sha256 = self.calibration_sha256(plan)
-        header = _header(self.data_dir, plan, self.views, configuration, calibration_sha256)
+        header = _header(self.data_dir, plan, self.views, self.configuration, calibration_sha256)
         return PreparedRun(self.data_dir / header.run_id, header, _timing(self.rig, plan), references)
 
     @property
     def views(self) -> dict[str, ViewFormat]:
         """Frames of every view."""
         return {view: ViewFormat(camera.image_shape, camera.bits) for view, camera in self.rig.cameras.items()}
+
+    def references(self, plan: RunPlan) -> dict[RunKind, tuple[Path, ...]]:
+        """Dark and background runs of a plan; PlanError if one of them does not belong to it."""
+        return find_references(self.data_dir, plan, self.views, self.configuration)
 
     def calibration_sha256(self, plan: RunPlan) -> str | None:
         """Hash of the calibration that a plan names; None if it names none."""

@@ -3,12 +3,13 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.errors import DeviceRefused, PlanError, ShotFileError
-from daq.files.run_directory import ReferenceImages, RunHeader, RunReader, ViewFormat, list_runs
+from daq.errors import PlanError, ShotFileError
+from daq.files.run_directory import ReferenceImages, RunReader, ViewFormat, list_runs
 from daq.run.state import RunOutcome
 from daq.run_plan import PulsePair, RunKind, RunPlan
 
@@ -16,21 +17,27 @@ _EXPOSURES = ("exposure_a_ns", "exposure_b_ns")
 REFERENCE_KINDS = (RunKind.DARK, RunKind.BACKGROUND)
 
 
-def find_references(data_dir: Path, plan: RunPlan, views: Mapping[str, ViewFormat]) -> dict[RunKind, tuple[Path, ...]]:
+def find_references(
+    data_dir: Path, plan: RunPlan, views: Mapping[str, ViewFormat], configuration: Mapping[str, Any]
+) -> dict[RunKind, tuple[Path, ...]]:
     """Directories of the reference runs of a plan, by kind.
 
     Raises
     ------
     PlanError
         A run does not exist, is neither dark nor background, was not completed, has no valid shot, other views or
-        formats, or is a background that was lit otherwise; the text names the difference.
+        formats, cameras that were told otherwise, or is a background that was lit otherwise; the text names the
+        difference.
     """
     known = {path.name: path for path in list_runs(data_dir)}
     found: dict[RunKind, tuple[Path, ...]] = dict.fromkeys(REFERENCE_KINDS, ())
     for run_id in plan.references:
         if run_id not in known:
             raise PlanError(f"references: no run {run_id!r} in {data_dir}")
-        kind = _checked_kind(run_id, RunReader(known[run_id]), views, plan.pulse)
+        reader = RunReader(known[run_id])
+        kind = _checked_kind(run_id, reader, views, plan.pulse)
+        if differing := told_otherwise(reader.header.configuration, configuration):
+            raise PlanError(f"references: for {run_id!r} cameras were told otherwise than they are now: {differing}")
         found[kind] = (*found[kind], known[run_id])
     return found
 
@@ -54,52 +61,46 @@ def mean_images(run_dirs: tuple[Path, ...]) -> ReferenceImages:
     return {view: (total / count).astype(np.float32) for view, total in sums.items()}
 
 
-def require_same_cameras(run_dirs: Iterable[Path], header: RunHeader, devices: Mapping[str, Mapping[str, str]]) -> None:
-    """Refuse references of which a view had another camera, or one that was told otherwise: its pixels are others.
+def exchanged_cameras(run_dirs: Iterable[Path], devices: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
+    """By view, which camera took a reference and which other one is there now: its pixels are others.
 
     Parameters
     ----------
     run_dirs : iterable of Path
         The reference runs.
-    header : RunHeader
-        Of the run that they shall belong to.
     devices : Mapping[str, Mapping[str, str]]
-        Who its devices are; of one that did not answer nothing is known.
-
-    Raises
-    ------
-    DeviceRefused
-        Names the view, the run and the difference.
+        Who the devices of the rig are; of one that did not answer nothing is known.
     """
+    exchanged = {}
     for run_dir in run_dirs:
         reference = RunReader(run_dir).header
         for view in reference.views:
             was, this = (_camera(told.get(view, {})) for told in (reference.devices, devices))
             if was and this and was != this:
-                reason = f"{run_dir.name} was recorded by {was}, and this is {this}: put the camera back, or"
-                raise DeviceRefused(view, f"{reason} record dark and background again, and calibrate again")
-            if difference := _told_otherwise(*(_settings(one, view) for one in (reference, header))):
-                reason = f"for {run_dir.name} the camera was told otherwise than its profile says: {difference}"
-                raise DeviceRefused(view, f"{reason}; record dark and background again")
+                exchanged[view] = f"{run_dir.name} was recorded by {was}, and this is {this}"
+    return exchanged
 
 
 def _camera(identity: Mapping[str, str]) -> str:
     return " ".join(identity.get(name, "") for name in ("vendor", "model", "serial")).strip()
 
 
-def _settings(header: RunHeader, view: str) -> Counter[str]:
+def told_otherwise(then: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """What cameras are told in one configuration and not in the other, but for the order; empty where nothing is."""
+    differing = []
+    for view in now.get("camera_profiles", {}):
+        before, after = _settings(then, view), _settings(now, view)
+        if before and after:
+            differing += [f"{view} {name} = {value} then" for name, value in before - after]
+            differing += [f"{view} {name} = {value} now" for name, value in after - before]
+    return ", ".join(differing)
+
+
+def _settings(configuration: Mapping[str, Any], view: str) -> Counter[tuple[str, Any]]:
     """What the camera of a view is told, and how long it exposes; empty in runs from before this was kept."""
-    profile = header.configuration.get("camera_profiles", {}).get(view, {})
-    told = [f"{one['feature']} = {one['value']}" for one in profile.get("features", ())]
-    exposures = [f"{name} = {value}" for name, value in profile.get("timing", {}).items() if name in _EXPOSURES]
-    return Counter((*told, *exposures))
-
-
-def _told_otherwise(then: Counter[str], now: Counter[str]) -> str:
-    """The differences, but for their order; empty where there are none, or nothing is known."""
-    if not then or not now:
-        return ""
-    return ", ".join([f"{one} then" for one in then - now] + [f"{one} now" for one in now - then])
+    profile = configuration.get("camera_profiles", {}).get(view, {})
+    told = [(one["feature"], one["value"]) for one in profile.get("features", ())]
+    return Counter((*told, *((name, value) for name, value in profile.get("timing", {}).items() if name in _EXPOSURES)))
 
 
 def _checked_kind(run_id: str, reader: RunReader, views: Mapping[str, ViewFormat], pulse: PulsePair) -> RunKind:

@@ -9,7 +9,7 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
-from daq.errors import DeviceError, RecorderError, StorageError
+from daq.errors import DeviceError, DeviceRefused, RecorderError, StorageError
 from daq.files.header import RunClosing
 from daq.files.outcome_note import write_note
 from daq.files.run_directory import RunWriter
@@ -18,7 +18,8 @@ from daq.run import light
 from daq.run.darkness import attempt, darken, fail
 from daq.run.guard import RunGuard
 from daq.run.recorder import Recorder
-from daq.run.references import mean_images, require_same_cameras
+from daq.run.references import exchanged_cameras, mean_images
+from daq.run.refusals import REMEDIES, RefusalCode
 from daq.run.shooting import Shooting
 from daq.run.shots.shot_check import InvalidStreak, ShotFindings, Thresholds, check_exposures, light_thresholds
 from daq.run.shots.shot_taking import ShotTaker
@@ -145,7 +146,8 @@ class RunSession:
         self._writer.write_devices(devices)
         if silent:
             raise silent[0]
-        require_same_cameras(chain(*self._references.values()), self._writer.header, devices)
+        for view, difference in exchanged_cameras(chain(*self._references.values()), devices).items():
+            raise DeviceRefused(view, f"{difference}: {REMEDIES[RefusalCode.REFERENCE_CAMERA]}")
 
     def _copy_references(self) -> Thresholds:
         """Let dark and background images travel with the run; returns the levels above which an exposure is lit."""

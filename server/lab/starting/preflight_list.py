@@ -33,7 +33,7 @@ CODES: Mapping[str, tuple[Code, ...]] = {
     "Network": (Code.NETWORK,),
     "Disk": (Code.FOLDER_GONE, Code.STORAGE, Code.DISK_FULL),
     "Stage": (Code.STAGE,),
-    "References": (Code.REFERENCES,),
+    "References": (Code.REFERENCES, Code.REFERENCE_CAMERA),
     "Calibration": (Code.CALIBRATION_UNKNOWN, Code.CALIBRATION_DAMAGED, Code.CALIBRATION_SIZE),
     "Recipe": (Code.RECIPE,),
 }

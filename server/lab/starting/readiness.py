@@ -2,10 +2,12 @@
 
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 
-from daq.errors import DaqError, DeviceUnavailable
+from daq.errors import DaqError, DeviceUnavailable, ShotFileError
+from daq.run.references import exchanged_cameras
 from daq.run.refusals import RefusalCode, coded
 from daq.run_plan import RunKind, RunPlan
 from server.lab.calibration_story import misfits
@@ -45,6 +47,8 @@ def refusals_of_lab(context: Context, plan: RunPlan | None) -> Iterator[Refusal]
     """What the laboratory has against a start; acquisition is asked after it."""
     if not context.services.acquisition.status().active:
         yield from _silent_cameras(context)
+    if plan is not None:
+        yield from _against_cameras(context, plan)
     if plan is not None and plan.calibration is not None:
         yield from _against_calibration(context, plan.calibration)
     if plan is not None:
@@ -76,6 +80,15 @@ def _silent_cameras(context: Context) -> Iterator[DaqError]:
         if lamp.kind == "camera" and lamp.health is Health.FAULT:
             reason = lamp.trouble.removeprefix(f"{lamp.name}: ")
             yield coded(DeviceUnavailable(lamp.name, reason), RefusalCode.CAMERA_SILENT)
+
+
+def _against_cameras(context: Context, plan: RunPlan) -> Iterator[ServerError]:
+    """Another camera has other pixels than the references; asked of what the cameras have told, not of them."""
+    devices = {name: asdict(identity) for name, identity in context.monitor.identities.items()}
+    chosen = (context.runs.directory(run_id) for run_id in plan.references if context.runs.has(run_id))
+    with suppress(ShotFileError):  # acquisition says so
+        for view, difference in exchanged_cameras(chosen, devices).items():
+            yield Unprocessable(f"references: {view}: {difference}", RefusalCode.REFERENCE_CAMERA)
 
 
 def _against_calibration(context: Context, calibration: str) -> Iterator[ServerError]:

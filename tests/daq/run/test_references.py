@@ -1,48 +1,56 @@
-"""Dark and background images are those of the same camera, told the same."""
+"""Dark and background images are those of cameras that were told the same."""
 
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from daq.errors import DeviceRefused
-from daq.files.run_directory import RunHeader, RunWriter
-from daq.run.references import require_same_cameras
-from tests.daq.files.test_run_directory import header_of
+from daq.errors import PlanError
+from daq.run.acquisition import Acquisition
+from daq.run.references import told_otherwise
+from daq.run_plan import RunKind
+from tests.daq.run.test_acquisition import DEADLINE_S, plan_of
+from tests.support.memory_rig import MemoryRig
 
 
-def header_with(gain: float | None, exposure_b_ns: int = 30_000_000, first: str = "TriggerMode") -> RunHeader:
-    """Of a run whose view1 was told a gain; None: from before runs kept what cameras are told."""
-    told = {"Gain": gain, "TriggerMode": "On"}
-    features = [{"feature": name, "value": told[name]} for name in sorted(told, key=lambda name: name != first)]
-    profile: dict[str, Any] = {"features": features, "timing": {"exposure_b_ns": exposure_b_ns, "guard_ns": 200}}
-    configuration = {} if gain is None else {"camera_profiles": {"view1": profile}}
-    return header_of().model_copy(update={"configuration": configuration})
+def told(gain: object, exposure_b_ns: int = 30_000_000, first: str = "TriggerMode") -> dict[str, Any]:
+    """Configuration of a rig whose view1 is told a gain; None: from before runs kept what cameras are told."""
+    values = {"Gain": gain, "TriggerMode": "On"}
+    features = [{"feature": name, "value": values[name]} for name in sorted(values, key=lambda name: name != first)]
+    profile = {"features": features, "timing": {"exposure_b_ns": exposure_b_ns, "guard_ns": 200}}
+    return {} if gain is None else {"camera_profiles": {"view1": profile}}
 
 
 @pytest.mark.parametrize(
-    ("header", "difference"),
+    ("now", "difference"),
     [
-        (header_with(2.0), "Gain = 1.0 then, Gain = 2.0 now"),
-        (header_with(1.0, 60_000_000), "exposure_b_ns = 30000000 then, exposure_b_ns = 60000000 now"),
+        (told(2.0), "view1 Gain = 1.0 then, view1 Gain = 2.0 now"),
+        (told(1.0, 60_000_000), "view1 exposure_b_ns = 30000000 then, view1 exposure_b_ns = 60000000 now"),
     ],
 )
-def test_a_reference_for_which_a_camera_was_told_otherwise_is_refused_with_the_difference(
-    tmp_path: Path, header: RunHeader, difference: str
-) -> None:
-    with RunWriter(tmp_path / "dark", header_with(1.0)):
-        pass
-    told = ""
-    try:
-        require_same_cameras([tmp_path / "dark"], header, {})
-    except DeviceRefused as error:
-        told = str(error)
-    assert told.startswith("view1: ")
-    assert difference in told
+def test_what_a_camera_is_told_otherwise_is_named_with_both_values(now: dict[str, Any], difference: str) -> None:
+    assert told_otherwise(told(1.0), now) == difference
 
 
-@pytest.mark.parametrize("header", [header_with(1.0), header_with(None), header_with(1.0, first="Gain")])
-def test_what_is_the_same_or_not_known_is_no_difference(tmp_path: Path, header: RunHeader) -> None:
-    with RunWriter(tmp_path / "dark", header_with(1.0)):
-        pass
-    require_same_cameras([tmp_path / "dark"], header, {})
+@pytest.mark.parametrize("now", [told(1.0), told(None), told(1.0, first="Gain"), told(1)])
+def test_what_is_the_same_or_not_known_is_no_difference(now: dict[str, Any]) -> None:
+    """A gain of 1 is one of 1.0, however its profile writes it."""
+    assert told_otherwise(told(1.0), now) == ""
+
+
+def test_a_reference_for_which_a_camera_was_told_otherwise_is_refused_before_a_run_begins(tmp_path: Path) -> None:
+    rig = MemoryRig().rig
+    with Acquisition(rig, tmp_path, configuration=told(1.0)) as acquisition:
+        dark = acquisition.start(plan_of(1, kind=RunKind.DARK))
+        assert not acquisition.wait(DEADLINE_S).active
+    refused = ""
+    with Acquisition(rig, tmp_path, configuration=told(2.0)) as acquisition:
+        try:
+            acquisition.start(plan_of(1, references=(dark,)))
+        except PlanError as error:
+            refused = str(error)
+    assert refused == (
+        f"references: for '{dark}' cameras were told otherwise than they are now: "
+        "view1 Gain = 1.0 then, view1 Gain = 2.0 now"
+    )
+    assert [path.name for path in tmp_path.iterdir()] == [dark]

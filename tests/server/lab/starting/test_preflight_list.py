@@ -12,6 +12,7 @@ from server.lab.starting.preflight_list import CODES, Check, CheckResult, check_
 from server.lab.starting.readiness import reasons_against
 from server.web.ui.run.chosen_runs import known_references
 from tests.server.web.test_api import use_a_calibration
+from tests.support.memory_rig import MemoryRig
 from tests.support.serving import Serving, plan_of
 
 ANN = Visitor("a", "ann")
@@ -112,6 +113,22 @@ def test_references_older_than_any_list_are_known_for_what_they_are(server: Serv
     assert found.text == "no background run"
     offered = [run.run_id for run in known_references(server.app.state.context.runs, [spray, "gone"])]
     assert offered == [newer, dark, background, spray], "what is chosen stays known, whatever it is"
+
+
+def test_a_camera_that_was_exchanged_since_its_references_is_named_with_the_remedy(server: Serving) -> None:
+    dark, _ = server.run_to_its_end(plan_of(kind="dark", shots=1))
+    laboratory = server.services.laboratory
+    assert isinstance(laboratory, MemoryRig)
+    laboratory.cameras["view2"].serial = "77"
+    assert server.http.post("/api/rig/devices/view2/reconnect").status_code == 200
+    found = looked_at(server, references=[dark])["References"]
+    assert found.text == (
+        f"references: view2: {dark} was recorded by tomoshadow memory view2, and this is tomoshadow memory 77"
+    )
+    assert (found.finding, found.remedy) == (
+        CheckResult.REFUSED,
+        "put the camera back, or record dark and background again, and calibrate again",
+    )
 
 
 def test_references_say_what_differs_and_what_is_newer(server: Serving) -> None:

@@ -188,6 +188,17 @@ def other_size(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @contextmanager
+def other_camera(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A dark run, and then another camera at the place of view2, which has told who it is."""
+    run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1))
+    shutil.copytree(server.services.data_dir / run_id, server.services.data_dir / "of-another-camera")
+    camera = laboratory(server).cameras["view2"]
+    patch.setattr(camera, "serial", "77")
+    assert server.http.post("/api/rig/devices/view2/reconnect").status_code == 200
+    yield
+
+
+@contextmanager
 def calibrated(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
     use_a_calibration(server)
     yield
@@ -215,6 +226,7 @@ OF_THE_FORM: dict[RefusalCode, tuple[Situation | None, dict[str, Any]]] = {
     RefusalCode.NETWORK: (thin_wire, {}),
     RefusalCode.STAGE: (None, {"kind": "calibration", "stage_z_mm": "0"}),
     RefusalCode.REFERENCES: (None, {"references": ["nothing"]}),
+    RefusalCode.REFERENCE_CAMERA: (other_camera, {"references": ["of-another-camera"]}),
     RefusalCode.CALIBRATION_UNKNOWN: (None, {"calibration": "nothing"}),
     RefusalCode.CALIBRATION_DAMAGED: (torn, {"calibration": "torn"}),
     RefusalCode.CALIBRATION_SIZE: (other_size, {"calibration": "small"}),
