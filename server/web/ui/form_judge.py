@@ -26,9 +26,9 @@ _NO_PLAN = Reason(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Verdict:
-    """What one look has found: the rig, reasons against a start, the first one first, and all that was looked at."""
+    """What a look has found, each another: the rig, reasons against a start, the first one first, and all else."""
 
     rig: _Rig
     reasons: tuple[Reason, ...]

@@ -1,7 +1,6 @@
 """LivePanel: the pictures of all cameras, and the buttons of the live view. Its light is that of the run form."""
 
 import asyncio
-import time
 from collections.abc import Callable
 from functools import partial
 
@@ -21,12 +20,11 @@ from server.web.ui.asking import try_to
 from server.web.ui.bar.server_link import TICKET, light_request, shown_form
 from server.web.ui.draft import DraftStore, problem_of, pulse_of
 from server.web.ui.live.live_tiles import LiveTiles
+from server.web.ui.refusal import Refusal
 from server.web.ui.theme import panel
 from server.web.ui.visiting import for_operators, visitor, why_not
 
 _FIELDS = LivePlan.model_fields
-_READ_S = 5.0
-"""So long a person has to read why a click was refused, at least."""
 _HINT = "No picture yet. Live shows the cameras and records nothing; Shoot one takes a single shot."
 
 
@@ -64,8 +62,7 @@ class LivePanel:
                 self._shoot.props("outline dense no-caps")
                 self._shoot.tooltip("One shot with the light of the form of a new run; the next one takes its place")
                 self._keep = ui.button("Keep shot", icon="save", on_click=self._on_keep).props("outline dense no-caps")
-            self._refusal = ui.label("").classes("refusal").props('role=alert aria-label="live refusal"')
-            self._refused_s, self._refused_of = -_READ_S, self._basis()
+            self._refusal = Refusal(self._basis, "live refusal")
             LiveTiles(context.services.rig.cameras, _HINT, full=True)
         self.refresh()
 
@@ -79,11 +76,10 @@ class LivePanel:
         for_operators(self._end, is_live)
         for_operators(self._shoot, may_shoot, why)
         for_operators(self._keep).set_visibility(bool(self._context.unkept_runs.ids) and status.resting)
-        if self._refused_of != self._basis() and time.monotonic() - self._refused_s >= _READ_S:
-            self._refusal.set_text("")
+        self._refusal.follow()
 
     def _basis(self) -> object:
-        """What a refusal is about: once it has changed, nobody knows whether a click would be refused again."""
+        """What a refusal is about."""
         return self._context.desk.state.reasons, self._draft.version, self._rate.value, self._lit.value
 
     async def _on_end(self) -> None:
@@ -128,7 +124,6 @@ class LivePanel:
         try:
             await asyncio.to_thread(action)
         except (DaqError, ServerError, ValueError) as error:
-            self._refusal.set_text(refusal_text(error))
-            self._refused_s, self._refused_of = time.monotonic(), self._basis()
+            self._refusal.show(refusal_text(error))
         else:
-            self._refusal.set_text("")
+            self._refusal.clear()

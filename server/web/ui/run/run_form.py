@@ -1,7 +1,6 @@
 """RunForm: the next run. Limits are those of the plan and of the rig; a refusal is shown with its reason."""
 
 import asyncio
-import time
 from functools import partial
 
 from nicegui import ui
@@ -17,7 +16,8 @@ from server.lab.starting.preflight_list import PASSING
 from server.lab.starting.run_start import start_run
 from server.web.ui.bar.server_link import TICKET, light_request, shown_form
 from server.web.ui.draft import DraftStore
-from server.web.ui.form_judge import FormJudge, Verdict
+from server.web.ui.form_judge import FormJudge
+from server.web.ui.refusal import Refusal
 from server.web.ui.run.chosen_runs import ChosenRuns
 from server.web.ui.run.chosen_work import ChosenWork
 from server.web.ui.run.form_fields import FormFields
@@ -26,8 +26,6 @@ from server.web.ui.run.templates import TemplateStore
 from server.web.ui.theme import panel
 from server.web.ui.visiting import for_operators, told, why_not
 
-_READ_S = 5.0
-"""So long a person has to read why a click was refused; then what speaks against a start now is told alone."""
 _TOLD_ELSEWHERE = {*PASSING, "form"}
 """They end by themselves, or the field itself says what is wrong with it."""
 
@@ -48,8 +46,6 @@ class RunForm:
     def __init__(self, context: Context, draft: DraftStore, judge: FormJudge) -> None:
         self._context, self._draft, self._judge = context, draft, judge
         self._shown = draft.version
-        self._verdict: Verdict | None = None
-        self._refused_s = -_READ_S
         templates = TemplateStore(context.services.data_dir / "templates", context.services.events)
         with panel("New run"):
             self._templates = TemplateBar(templates, draft, self._show)
@@ -58,14 +54,14 @@ class RunForm:
             self._work = ChosenWork(draft, self._changed)
             with ui.expansion("Notes", icon="edit_note", value=True).classes("w-full notes"):
                 self._fields.add_notes()
-            self._refusal = ui.label("").classes("refusal").props("role=alert")
+            self._refusal = Refusal(lambda: judge.verdict, "why no run starts")
             self._start = ui.button("Start run", icon="play_arrow").classes("w-full")
             self._start.on("click", self._on_start, js_handler=TICKET)
         self._show_kind()
 
     def refresh(self) -> None:
         """Follow the state of acquisition, who holds control, what speaks against a start, and other tabs."""
-        self._show_verdict()
+        self._refusal.follow(self._against())
         why = why_not(self._context)
         for_operators(self._start, not self._context.services.acquisition.status().active, why)
         for part in (self._templates, self._fields, self._chosen, self._work):
@@ -77,12 +73,10 @@ class RunForm:
         """Show the reference runs and calibrations that exist now."""
         await self._chosen.reload()
 
-    def _show_verdict(self) -> None:
-        verdict = self._judge.verdict
-        if verdict is not self._verdict and time.monotonic() - self._refused_s >= _READ_S:
-            self._verdict = verdict
-            told_here = [one for one in verdict.reasons if one.code not in _TOLD_ELSEWHERE] if verdict else []
-            self._refusal.set_text("\n".join(f"{one.text} ({one.remedy})" for one in told_here))
+    def _against(self) -> str:
+        """What speaks against a start now."""
+        reasons = self._judge.verdict.reasons if self._judge.verdict else ()
+        return "\n".join(f"{one.text} ({one.remedy})" for one in reasons if one.code not in _TOLD_ELSEWHERE)
 
     def _changed(self) -> None:
         """Here: what is shown already is not shown again, unless another tab has changed something meanwhile."""
@@ -113,7 +107,6 @@ class RunForm:
             start = partial(start_run, self._context, plan)
             await asyncio.to_thread(obey, self._context, request, described("run", plan), start)
         except (DaqError, ServerError, ValueError) as error:
-            self._refusal.set_text(told(error))
-            self._refused_s = time.monotonic()
+            self._refusal.show(told(error))
         else:
-            self._refusal.set_text("")
+            self._refusal.clear()
