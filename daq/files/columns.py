@@ -4,6 +4,7 @@ One table says name, type, unit and shape; shot files, the virtual view over the
 made from it. The first axis of every column is the shot.
 """
 
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +18,8 @@ from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Flaw, Image, Light
 
 Columns = Mapping[str, NDArray[Any]]
 
+SHOT_VERSION = 2
+"""Of shot files: a column says since which one it is there."""
 PULSE_SLOTS = 4
 """Light pulses per view that a shot can hold; a slot without a pulse has width 0."""
 NO_SEQUENCE = -1
@@ -27,13 +30,13 @@ NO_EDGE_NS = -(2**63)
 
 @dataclass(frozen=True)
 class Column:
-    """Number type, unit, and axes after the shot axis; one that came later is missing in older files, and 0 there."""
+    """Number type, unit, axes after the shot axis, and the version of shot files since which it is there; 0 before."""
 
     dtype: str
     units: str
     shape: tuple[int, ...] = ()
     axes: str = "shot"
-    later: bool = False
+    since: int = 1
 
 
 _SHOT_COLUMNS = {
@@ -42,9 +45,9 @@ _SHOT_COLUMNS = {
     "sequence": Column("i8", "1"),
     "host_time_ns": Column("i8", "ns"),
     "stage_z_mm": Column("f8", "mm"),
-    "refires": Column("i8", "1", later=True),
-    "period_ns": Column("i8", "ns", later=True),
-    "clock_step_ns": Column("i8", "ns", later=True),
+    "refires": Column("i8", "1", since=2),
+    "period_ns": Column("i8", "ns", since=2),
+    "clock_step_ns": Column("i8", "ns", since=2),
 }
 _EXPOSURE_COLUMNS = {
     "valid": ("?", "1"),
@@ -54,7 +57,7 @@ _EXPOSURE_COLUMNS = {
     "resent_packets": ("i8", "1"),
     "flaw": ("u1", "1"),
 }
-_LATER_OF_EXPOSURES = ("flaw",)
+_SINCE = {"flaw": 2}
 _PULSE_COLUMNS = {"start_ns": ("i8", "ns"), "width_ns": ("i8", "ns"), "current_a": ("f8", "A")}
 
 
@@ -73,20 +76,27 @@ def crc32_path(view: str) -> str:
     return view_path(view, "crc32")
 
 
-def columns_of(header: RunHeader) -> dict[str, Column]:
-    """Every column of a run by its path."""
+def columns_of(header: RunHeader, version: int = SHOT_VERSION) -> dict[str, Column]:
+    """Every column of a run by its path; those that shot files of a version have."""
     columns = {f"/shots/{name}": column for name, column in _SHOT_COLUMNS.items()}
     frames = (header.frames_per_shot,)
     for view in header.views:
         columns[crc32_path(view)] = Column("u4", "1", frames, "shot,frame")
         columns[view_path(view, "camera_trigger_ns")] = Column("i8", "ns")
         for name, (dtype, units) in _EXPOSURE_COLUMNS.items():
-            later = name in _LATER_OF_EXPOSURES
-            columns[view_path(view, name)] = Column(dtype, units, frames, "shot,frame", later)
-        columns[view_path(view, "late_frames")] = Column("i8", "1", later=True)
+            columns[view_path(view, name)] = Column(dtype, units, frames, "shot,frame", _SINCE.get(name, 1))
+        columns[view_path(view, "late_frames")] = Column("i8", "1", since=2)
         for name, (dtype, units) in _PULSE_COLUMNS.items():
             columns[view_path(view, f"pulse_{name}")] = Column(dtype, units, (PULSE_SLOTS,), "shot,pulse")
-    return columns
+    return {path: column for path, column in columns.items() if column.since <= version}
+
+
+def crc32_of(run_id: str, columns: Mapping[str, Any]) -> int:
+    """CRC-32 of all numbers of a shot, each after its path."""
+    check = zlib.crc32(run_id.encode())
+    for name in sorted(columns):
+        check = zlib.crc32(np.asarray(columns[name]).tobytes(), zlib.crc32(name.encode(), check))
+    return check
 
 
 def shot_to_columns(shot: Shot, header: RunHeader) -> dict[str, NDArray[Any]]:

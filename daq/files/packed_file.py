@@ -13,7 +13,7 @@ from daq.files.columns import columns_of, frames_path
 from daq.files.header import RunHeader
 from daq.files.later_notes import document_of, read_changes
 from daq.files.run_file import RUN_FILE, reading, shot_path, write_later_notes
-from daq.files.shot_file import LIBRARY_VERSIONS, create_frames, is_missing, read_shot_of, reading_shot
+from daq.files.shot_file import LIBRARY_VERSIONS, create_frames, read_shot_of, reading_shot
 from daq.files.storage import storing
 
 
@@ -91,7 +91,7 @@ def _read_as_it_is(path: Path, header: RunHeader) -> tuple[dict[str, Any], dict[
     """
     numbers = range(header.frames_per_shot)
     with reading_shot(path, header) as shot:
-        columns = {name: shot[name][0] for name, column in columns_of(header).items() if not is_missing(shot, column)}
+        columns = {name: shot[name][0] for name in columns_of(header, shot.attrs["schema_version"])}
         frames = {view: shot[frames_path(view)].id for view in header.views}
         chunks = {(view, n): frames[view].read_direct_chunk((0, n, 0, 0))[1] for view in header.views for n in numbers}
     return columns, chunks

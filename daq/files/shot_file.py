@@ -1,6 +1,5 @@
 """RUN/shots/N.h5: one shot. Written to a part, fsynced, committed by rename; never written again."""
 
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,7 +12,17 @@ from h5py import h5d, h5p, h5s, h5t
 from numpy.typing import NDArray
 
 from daq.errors import DamagedFrame, DamagedNumbers, ForeignFile, RecorderError, RenamedFile, ShotFileError
-from daq.files.columns import Column, columns_of, crc32_path, frames_path, shot_from_columns, shot_to_columns, view_path
+from daq.files.columns import (
+    SHOT_VERSION,
+    Column,
+    columns_of,
+    crc32_of,
+    crc32_path,
+    frames_path,
+    shot_from_columns,
+    shot_to_columns,
+    view_path,
+)
 from daq.files.encoding import EncodedFrame, decode_frame, encode_frame, is_shuffled
 from daq.files.header import RunHeader, ViewFormat
 from daq.files.text_heap import has_whole_heaps
@@ -24,8 +33,8 @@ LIBRARY_VERSIONS = ("v110", "v110")
 """Format of every file: newer formats cannot be opened by the HDF5 1.10 tools of current distributions."""
 SHOT_SCHEMA = "tomoshadow-shot"
 SCHEMA_VERSION = 1
-SHOT_VERSION = 2
-"""Of shot files: in those of version 1 the later columns are missing."""
+_FIXED_TEXTS = 2
+"""Since this version no text lies in a heap."""
 _BEGAN = "run_created_utc"
 """Attribute with the time of the run, as two runs may have one name; files from before have none."""
 _SEAL = "columns_crc32"
@@ -80,7 +89,7 @@ def write_encoded_shot(path: Path, encoded: EncodedShot, header: RunHeader) -> N
                 frames.id.write_direct_chunk((0, number, 0, 0), frame.chunk)
         for name, values in encoded.columns.items():
             _create_column(file, name, described[name], values)
-        file.attrs[_SEAL] = np.uint32(_crc32_of(header.run_id, encoded.columns))
+        file.attrs[_SEAL] = np.uint32(crc32_of(header.run_id, encoded.columns))
 
 
 @contextmanager
@@ -91,6 +100,8 @@ def reading_shot(path: Path, header: RunHeader) -> Iterator[h5py.File]:
             _check_heaps(path, file)
             if (_text(file.attrs["schema"]), _text(file.attrs["run_id"])) != (SHOT_SCHEMA, header.run_id):
                 raise ForeignFile(f"{path}: not a shot of run {header.run_id}")
+            if (version := file.attrs["schema_version"]) > SHOT_VERSION:
+                raise ShotFileError(f"{path}: version {version}, this program reads {SHOT_VERSION}: take a newer one")
             began = _text(file.attrs.get(_BEGAN, header.created_utc))
             if header.created_utc and began != header.created_utc:
                 raise ForeignFile(f"{path}: of another run of this name, which began at {began}")
@@ -112,8 +123,7 @@ def read_shot_file(path: Path, header: RunHeader, exposures: Exposures = "ab") -
         The file is missing, torn, damaged, or belongs to another run; the text names it.
     """
     with reading_shot(path, header) as file:
-        columns = {name: _read_column(file, name, column) for name, column in columns_of(header).items()}
-        _check_seal(path, file, columns)
+        columns = _read_columns(path, file, header)
         frames = {
             view: _read_frames(path, file, view, view_format, columns[crc32_path(view)], exposures)
             for view, view_format in header.views.items()
@@ -206,8 +216,8 @@ def _fixed(**attributes: Any) -> Attributes:
 
 
 def _check_heaps(path: Path, file: h5py.File) -> None:
-    """OSError if HDF5 would read texts for ever; in a file of version 1 they lie in heaps, its version does not."""
-    if file.attrs["schema_version"] < SHOT_VERSION and not has_whole_heaps(path):
+    """OSError if HDF5 would read texts for ever; where they lie in heaps, their version does not."""
+    if file.attrs["schema_version"] < _FIXED_TEXTS and not has_whole_heaps(path):
         raise OSError("a heap of texts is broken")
 
 
@@ -215,32 +225,21 @@ def _text(attribute: str | bytes) -> str:
     return attribute.decode() if isinstance(attribute, bytes) else attribute
 
 
-def is_missing(shot: h5py.File, column: Column) -> bool:
-    """Whether a shot file is from before a column, by its version: h5py says that a damaged name is not there."""
-    return bool(column.later and shot.attrs["schema_version"] < SHOT_VERSION)
+def _read_columns(path: Path, file: h5py.File, header: RunHeader) -> dict[str, Any]:
+    """Those that the file has, which its seal is of, and zeros for those that came later."""
+    described = columns_of(header)
+    columns = {name: _read_column(file, name) for name in columns_of(header, file.attrs["schema_version"])}
+    written = file.attrs.get(_SEAL)
+    if written is not None and int(written) != crc32_of(_text(file.attrs["run_id"]), columns):
+        raise DamagedNumbers(f"{path}: its numbers are not those that were written: copy it back from a backup")
+    return {name: columns.get(name, np.zeros(column.shape, column.dtype)) for name, column in described.items()}
 
 
-def _read_column(file: h5py.File, name: str, column: Column) -> Any:
-    if is_missing(file, column):
-        return np.zeros(column.shape, column.dtype)
+def _read_column(file: h5py.File, name: str) -> Any:
     stored = h5d.open(file.id, name.encode())  # a shot has some sixty columns: h5py's own Dataset takes twice as long
     values = np.empty(stored.shape, stored.dtype)
     stored.read(h5s.ALL, h5s.ALL, values)
     return values[0]
-
-
-def _crc32_of(run_id: str, columns: Mapping[str, Any]) -> int:
-    """CRC-32 of all numbers of a shot, each after its path."""
-    check = zlib.crc32(run_id.encode())
-    for name in sorted(columns):
-        check = zlib.crc32(np.asarray(columns[name]).tobytes(), zlib.crc32(name.encode(), check))
-    return check
-
-
-def _check_seal(path: Path, file: h5py.File, columns: Mapping[str, Any]) -> None:
-    written = file.attrs.get(_SEAL)
-    if written is not None and int(written) != _crc32_of(_text(file.attrs["run_id"]), columns):
-        raise DamagedNumbers(f"{path}: its numbers are not those that were written: copy it back from a backup")
 
 
 def _read_frames(

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from daq.errors import ShotFileError
+from daq.files.columns import columns_of, crc32_of
 from daq.files.repair import repair
 from daq.files.run_directory import RunReader, RunWriter, pack
 from daq.files.verification import FlawKind, verify
@@ -181,3 +182,26 @@ def test_what_is_not_as_it_was_written_is_not_packed(run_dir: Path, tmp_path: Pa
     with pytest.raises(ShotFileError, match=r"\.h5: (holds shot 1|exposure A of view1: damaged)"):
         pack(run_dir, tmp_path / "packed.h5")
     assert not (tmp_path / "packed.h5").exists()
+
+
+def test_a_shot_of_an_older_version_is_sound_with_the_columns_it_has(tmp_path: Path) -> None:
+    """Its checksum is that of those columns, whatever this program knows besides."""
+    header = header_of()
+    with RunWriter(tmp_path / "run", header) as writer:
+        writer.write_shot(shot_of(header, 0))
+        writer.finish("completed")
+    old, new = columns_of(header, version=1), columns_of(header)
+    with h5py.File(tmp_path / "run" / "shots" / "0.h5", "r+") as file:
+        for name in new.keys() - old.keys():
+            del file[name]
+        file.attrs.modify("schema_version", 1)
+        check = crc32_of(header.run_id, {name: file[name][0] for name in old})
+        file.attrs.modify("columns_crc32", np.uint32(check))
+    assert [flaw.text for flaw in verify(tmp_path / "run").flaws] == []
+    assert RunReader(tmp_path / "run").read_shot(0).refires == 0
+
+
+def test_a_shot_of_a_newer_program_is_called_so(run_dir: Path) -> None:
+    edited(run_dir / "shots" / "1.h5", lambda file: file.attrs.modify("schema_version", 3))
+    told = [flaw.text for flaw in verify(run_dir).flaws]
+    assert [text.partition("1.h5: ")[2] for text in told] == ["version 3, this program reads 2: take a newer one"]
