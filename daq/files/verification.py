@@ -6,6 +6,7 @@ from enum import StrEnum
 from itertools import islice
 from pathlib import Path
 
+from daq.counted import counted
 from daq.errors import AlreadyHeld, DamagedFrame, DamagedNumbers, ForeignFile, RenamedFile, ShotFileError
 from daq.files.atomic_file import PART_SUFFIX
 from daq.files.header import RunClosing, RunHeader
@@ -169,7 +170,11 @@ def _without_shots(
     recorded = read_shot_count(run_dir)
     planned = header.plan.total_shots if header.plan else None
     plan = "" if planned is None else f" of {planned} that were planned"
-    were = f"{recorded} shots{plan} were recorded" if recorded else f"nobody knows how many shots{plan} were recorded"
+    were = (
+        f"{counted(recorded, 'shot')}{plan} recorded"
+        if recorded
+        else f"nobody knows how many shots{plan} were recorded"
+    )
     text = f"{run_dir}: has no folder {SHOTS_FOLDER}; {were}: bring it back, or copy it from a backup"
     outcome = closing.outcome if closing else None
     return Verification(outcome, recorded, 0, 0, (Flaw(FlawKind.MISSING, SHOTS_FOLDER, text), *strangers))

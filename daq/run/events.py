@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from daq.causes import Cause
+from daq.counted import counted
 from daq.run.state import RunOutcome, RunState
 from daq.run_plan import LivePlan, RunPlan
 
@@ -80,7 +81,7 @@ class RunStatus:
     @property
     def summary(self) -> str:
         """The counts in words."""
-        return f"{self.shots_recorded} of {self.shots_planned} shots recorded, {self.shots_valid} valid"
+        return f"{self.shots_recorded} of {counted(self.shots_planned, 'shot')} recorded, {self.shots_valid} valid"
 
 
 @dataclass(frozen=True)

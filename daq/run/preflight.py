@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from daq.counted import counted
 from daq.devices import Rig
 from daq.errors import DaqError, PlanError
 from daq.files.run_directory import RunHeader, ViewFormat
@@ -236,8 +237,8 @@ def _check_disk(data_dir: Path, plan: RunPlan, views: Mapping[str, ViewFormat], 
     free = shutil.disk_usage(_existing(data_dir)).free
     if needed > free:
         raise PlanError(
-            f"shots: {plan.total_shots} shots of {shot_bytes} bytes need {needed} bytes on the disk of {data_dir}, "
-            f"{free} bytes are free"
+            f"shots: {counted(plan.total_shots, 'shot')} of {shot_bytes} bytes, in all {needed} bytes, do not fit the "
+            f"disk of {data_dir}: {free} bytes are free"
         )
 
 

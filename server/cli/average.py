@@ -5,6 +5,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from daq.counted import counted
 from processing.reconstruction.choices import VoxelType
 from processing.runs.errors import PipelineError
 from server.cli.chosen_shots import selected_shots
@@ -62,12 +63,13 @@ def average(options: Namespace) -> Outcome:
         raise PipelineError(f"{options.results} is a run: name its --calibration to average it")
     result = _average_results(options) if options.calibration is None else _average_run(options)
     grid = describe_grid(result["grid"]["shape"], result["grid"]["pitch_mm"])
-    what = f"mean of {result['volumes']} volumes of exposure {options.exposure.upper()}"
+    what = f"mean of {counted(result['volumes'], 'volume')} of exposure {options.exposure.upper()}"
     text = f"{result['file']}: {what}, {grid}; slices in {result['figure']}"
     for one in result["faults"]:
         tell_faults(f"shot {one['shot']}, exposure {options.exposure}", one)
     if result["faults"]:
-        text += f"\n{len(result['faults'])} of {result['volumes']} exposures may be wrong, and are part of the mean"
+        all_of_them = counted(result["volumes"], "exposure")
+        text += f"\n{len(result['faults'])} of {all_of_them} may be wrong, and are part of the mean"
     if result["light"]:
         text += f"\n{result['light']}"
     return Outcome(result, text)
@@ -143,7 +145,7 @@ def _averaged(
             shots,
             calibration,
             settings,
-            lambda done, of: bar.step(done, of, f"{options.results.name}: {done} exposures"),
+            lambda done, of: bar.step(done, of, f"{options.results.name}: {counted(done, 'exposure')}"),
             frame=options.exposure,
             threads=usable_processors(),
             workbench=workbench,
@@ -174,7 +176,7 @@ def _written(
         volume = SlabVolume(look.watching(mean.slabs()), VoxelType.FLOAT32, 1.0)
         write_slabs(out, volume, grid, {**source, **told, **made_by}, threads=usable_processors())
         seen = look.look(lambda axis, index: mean.part(Part.plane(grid, axis, index)).squeeze(axis))
-        drawn = look_figure(seen, grid, f"mean of {count} volumes")
+        drawn = look_figure(seen, grid, f"mean of {counted(count, 'volume')}")
         drawn.savefig(out.with_name(figure.name), dpi=120)
     return {
         "file": str(options.out),

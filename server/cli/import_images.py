@@ -4,9 +4,9 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from daq.counted import counted
 from server.cli.options import Verbs, add_out, add_verb
 from server.cli.output import Bar, Outcome, progress
-from server.reports.digits import counted
 
 
 def add(verbs: Verbs) -> None:
@@ -36,7 +36,7 @@ def imported(result: dict[str, Any]) -> str:
     """What was written, for people."""
     lines = [f"cameras: {', '.join(result['cameras'])}"]
     if result["calibration"]:
-        lines.append(f"calibration set: {result['calibration']}, {result['planes']} planes")
+        lines.append(f"calibration set: {result['calibration']}, {counted(result['planes'], 'plane')}")
     if result["run"]:
         lines.append(f"run: {result['run']}, {counted(result['shots'], 'shot')}")
     return "\n".join(lines)

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from daq.counted import counted
 from processing.reconstruction.choices import VoxelType
 from server.cli.chosen_shots import selected_shots
 from server.cli.cluster.scheduler_option import add_scheduler, require_followed, shots_elsewhere
@@ -210,4 +211,4 @@ def volumes_table(result: dict[str, Any]) -> str:
 def _summary(result: dict[str, Any]) -> str:
     grid = describe_grid(result["grid"]["shape"], result["grid"]["pitch_mm"])
     cost = f"{result['cpu_s']:.1f} CPU-s, at most {result['peak_rss_mb']:.0f} MB"
-    return f"{len(result['volumes'])} volumes by {result['method']}, {grid}; {cost}"
+    return f"{counted(len(result['volumes']), 'volume')} by {result['method']}, {grid}; {cost}"

@@ -4,6 +4,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from daq.counted import counted
 from server.cli.options import Verbs, count, positive, seed, width
 from server.cli.output import Bar, progress
 from server.cli.studies.breakup import add_break_up
@@ -186,7 +187,8 @@ def residuals(options: Namespace) -> dict[str, Any]:
 
 
 def _residual_line(row: "ResidualRow") -> str:
-    return f"{row.view}, {row.points}, z = {row.z_mm:g} mm: {row.mean_error_px:.2g} px at {row.n_points} points"
+    error = f"{row.mean_error_px:.2g} px at {counted(row.n_points, 'point')}"
+    return f"{row.view}, {row.points}, z = {row.z_mm:g} mm: {error}"
 
 
 def _add_calibration(studies: Verbs) -> None:

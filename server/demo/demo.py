@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from daq.counted import counted
 from daq.errors import DaqError
 from daq.files.run_directory import RunReader
 from daq.run.acquisition import Acquisition
@@ -224,12 +225,12 @@ class _Runs:
 
     def record(self, kind: RunKind, shots: int, rate_hz: float, **details: Any) -> Path:
         plan = RunPlan(name=f"demo {kind.value}", kind=kind, shots=shots, rate_hz=rate_hz, pulse=self._pulse, **details)
-        self._progress(f"recording {plan.total_shots} {kind.value} shots")
+        self._progress(f"recording {counted(plan.total_shots, f'{kind.value} shot')}")
         run_dir = self._data_dir / self._acquisition.start(plan)
         status = self._acquisition.wait(RUN_DEADLINE_S)
         if status.outcome is not RunOutcome.COMPLETED:
             raise DaqError(f"{run_dir.name}: {status.outcome or status.state}, {status.message}")
-        self._progress(f"{run_dir.name}: {status.shots_valid} of {status.shots_planned} shots valid")
+        self._progress(f"{run_dir.name}: {status.shots_valid} of {counted(status.shots_planned, 'shot')} valid")
         return run_dir
 
 
@@ -259,7 +260,7 @@ def _recorded_and_valid(run_dir: Path) -> tuple[int, list[int]]:
     with RunReader(run_dir) as run:
         recorded, valid = run.shot_count, [index for index in range(run.shot_count) if run.read_shot(index).valid]
     if not valid:
-        raise DaqError(f"{run_dir.name}: none of {recorded} shots is valid, nothing to reconstruct")
+        raise DaqError(f"{run_dir.name}: no shot of {recorded} is valid, nothing to reconstruct")
     return recorded, valid
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from daq.counted import counted
 from daq.files.run_directory import RunReader
 from processing.figures.found_figures import found_figure
 from processing.figures.residual_figures import residuals_figure
@@ -18,7 +19,6 @@ from server.demo.demo_answers import answers_table
 from server.demo.demo_droplets import COUNTED_UM, MeasuredDroplets
 from server.demo.demo_liquid import MeasuredLiquid
 from server.demo.demo_summary import reasons_of
-from server.reports.digits import counted
 from server.reports.liquid_sections import ReportedLiquid, break_up_section, unknown_section
 from server.reports.object_motion_section import object_motion_section
 from server.reports.page import Picture, Section, Table, write_report
@@ -163,7 +163,9 @@ def _velocities(droplets: MeasuredDroplets) -> str:
     if shot.velocity is None or droplets.velocities is None:
         return shot.velocity_reason or "; ".join(shot.velocity.reasons if shot.velocity else ())
     share = 100 * (shot.velocity.share_paired or 0)
-    return f"{shot.velocity.pairs} pairs, {share:.1f} % of the droplets of A that do not leave the box until B"
+    return (
+        f"{counted(shot.velocity.pairs, 'pair')}, {share:.1f} % of the droplets of A that do not leave the box until B"
+    )
 
 
 _CALIBRATION_TEXT = (

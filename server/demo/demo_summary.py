@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from daq.counted import counted
 from processing.analysis.estimates import Estimate
 from server.demo.demo import Demonstration
 from server.demo.demo_answers import spray_answers
@@ -64,7 +65,7 @@ def reasons_of(droplets: MeasuredDroplets) -> list[str]:
 
 def readable_summary(result: dict[str, Any]) -> str:
     """The same for a person."""
-    lines = [f"{result['shots_valid']} of {result['shots_planned']} shots valid", ""]
+    lines = [f"{result['shots_valid']} of {counted(result['shots_planned'], 'shot')} valid", ""]
     lines.append(f"{'view':8}{'mean error':>12}{'hold-out':>12}{'true error':>12}  [px]")
     for name, view in result["views"].items():
         errors_px = "".join(f"{view[key]:12.4f}" for key in ("mean_error_px", "holdout_error_px", "true_error_px"))
@@ -83,9 +84,10 @@ def _droplets_line(droplets: dict[str, Any]) -> str:
         return f"droplets: {droplets['verdict']}: {'; '.join(droplets['reasons'])}"
     d32 = "D32 {value:.1f} um ({low:.1f} to {high:.1f})".format(**droplets["d32_um"])
     return (
-        f"{droplets['droplets']} droplets, {droplets['verdict']}: {100 * droplets['found_share']:.1f} % of those from "
+        f"{counted(droplets['droplets'], 'droplet')}, {droplets['verdict']}: "
+        f"{100 * droplets['found_share']:.1f} % of those from "
         f"{droplets['counted_from_um']:g} um on found, {100 * droplets['true_ghost_share']:.1f} % ghosts, {d32}, "
-        f"true {droplets['true_d32_um']:.1f} um; {droplets['liquid_objects']} ligaments masked, "
+        f"true {droplets['true_d32_um']:.1f} um; {counted(droplets['liquid_objects'], 'ligament')} masked, "
         f"{100 * droplets['hidden_share']:.1f} % of the volume hidden{_velocity(droplets)}"
     )
 
@@ -96,7 +98,7 @@ def _velocity(droplets: dict[str, Any]) -> str:
     means_m_s = (droplets["velocity"]["mean_m_s"], droplets["true_velocity_m_s"])
     told, true = (", ".join(f"{one:.2f}" for one in mean) for mean in means_m_s)
     return (
-        f"; {droplets['velocity']['pairs']} velocities, mean ({told}) m/s, in truth ({true}) m/s for those that "
+        f"; velocities: {droplets['velocity']['pairs']}, mean ({told}) m/s, in truth ({true}) m/s for those that "
         "are of true droplets, "
         f"rms error {droplets['velocity_rms_m_s']:.2f} m/s"
     )
@@ -119,5 +121,5 @@ def _liquid_line(liquid: dict[str, Any]) -> str:
     else:
         high = "beyond the field" if length["high"] is None else f"{length['high']:.2f}"
         told = f"break-up length {length['value']:.2f} mm ({length['low']:.2f} to {high}), {true}"
-    counted = ", ".join(f"{liquid[name]} {name}" for name in ("ligaments", "sheets", "clusters"))
-    return f"{told}; {counted} in exposure A of {liquid['shots']} shots"
+    objects = ", ".join(counted(liquid[f"{name}s"], name) for name in ("ligament", "sheet", "cluster"))
+    return f"{told}; {objects} in exposure A of {counted(liquid['shots'], 'shot')}"

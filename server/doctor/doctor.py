@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from daq.counted import counted
 from server.doctor.checkup import Checkup, Status
 from server.doctor.doctor_host import check_host
 from server.doctor.doctor_rig import check_rig
@@ -21,7 +22,7 @@ def examine(config_file: Path | None) -> Iterator[Checkup]:
         yield Checkup("configuration", Status.FAIL, str(error), "mend the line that the text names")
         yield from check_host(Path())
         return
-    yield Checkup("configuration", Status.OK, f"{config_file}: {config.name}, {len(config.views)} views")
+    yield Checkup("configuration", Status.OK, f"{config_file}: {config.name}, {counted(len(config.views), 'view')}")
     yield from check_host(config.server.data_dir)
     if config.processing.scheduler:
         yield check_scheduler(config.processing)

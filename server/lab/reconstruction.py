@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
+from daq.counted import counted
 from daq.run_plan import ImageKey
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.droplets.measure_settings import MeasureSettings
@@ -64,7 +65,7 @@ def requested_shots(
     context.runs.require_sound(summary)
     wanted = _valid_shots(context, run_id) if shots is None else list(shots)
     if absent := [shot for shot in wanted if shot >= summary.shots_recorded]:
-        raise Unprocessable(f"run {run_id} has {summary.shots_recorded} shots, not {absent}")
+        raise Unprocessable(f"run {run_id} has {counted(summary.shots_recorded, 'shot')}, not {absent}")
     return chosen, wanted
 
 

@@ -21,8 +21,3 @@ def digits_of_interval(value: float, low: float, high: float) -> tuple[str, str,
         return three_digits(value), three_digits(low), three_digits(high)
     decimals = max(0, 1 - floor(log10(half)))
     return f"{value:.{decimals}f}", f"{low:.{decimals}f}", f"{high:.{decimals}f}"
-
-
-def counted(number: int, what: str) -> str:
-    """A number of things: ``1 shot``, ``2 shots``."""
-    return f"{number} {what}{'s' * (number != 1)}"

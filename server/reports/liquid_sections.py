@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from daq.counted import counted
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.objects.break_up import Reach
 from processing.analysis.objects.connected_share import BreakUp, break_up_of, connected_share
@@ -15,7 +16,6 @@ from processing.analysis.objects.seeing_views import UnseenMap
 from processing.figures.object_figures import BreakUpCurve, break_up_figure, unseen_figure
 from processing.geometry import FloatArray
 from processing.runs.liquid.objects import objects_of, reaches_of, told_of_exposures
-from server.reports.digits import counted
 from server.reports.page import Picture, Section, Table
 from server.reports.spray_tables import cells_of
 

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from daq.counted import counted
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.objects.liquid_objects import ObjectClass
 from processing.figures.object_motion_figure import MovedObjects, object_motion_figure
-from server.reports.digits import counted
 from server.reports.page import Picture, Section, Table
 
 TEXT = (

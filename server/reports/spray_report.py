@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from daq.counted import counted
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.spray.density_map import NO_CELLS, density_maps
 from processing.analysis.spray.spray_sample import SpraySample, spray_sample
@@ -94,11 +95,11 @@ def spray_sections(reported: ReportedSpray, chapters: Sequence[Chapter] = ()) ->
 
 def _summary(reported: ReportedSpray) -> Section:
     told = reported.told
-    counted = (
-        f"{told.droplets.n} droplets, exposures: {told.droplets.exposures}{_twice(told)}, "
+    seen = (
+        f"{counted(told.droplets.n, 'droplet')}, exposures: {told.droplets.exposures}{_twice(told)}, "
         f"shots: {told.droplets.shots}; sampling: {told.sampling}."
     )
-    text = f"{counted} {SAMPLES[told.sample.verdict] if told.sample else ''} {_verdicts(reported)}"
+    text = f"{seen} {SAMPLES[told.sample.verdict] if told.sample else ''} {_verdicts(reported)}"
     liquid = ReportedLiquid.of_files(reported.spray.shots)
     table = figures_table(told, liquid_rows(liquid) if liquid else ())
     return Section("Summary", text, [table], points=[*conditions_of(reported), *doubts(told)])
@@ -116,8 +117,8 @@ def conditions_of(reported: ReportedSpray) -> list[str]:
 
 def _verdicts(reported: ReportedSpray) -> str:
     """How many exposures are good, doubtful, refused."""
-    counted = Counter(row[VERDICT] for row in exposure_rows(reported.spray.shots))
-    return "Verdicts on the exposures: " + ", ".join(f"{n} {verdict}" for verdict, n in counted.items()) + "."
+    exposures = Counter(row[VERDICT] for row in exposure_rows(reported.spray.shots))
+    return "Verdicts on the exposures: " + ", ".join(f"{n} {verdict}" for verdict, n in exposures.items()) + "."
 
 
 def origin_section(reported: ReportedSpray) -> Section:
@@ -184,9 +185,9 @@ def _patternations(reported: ReportedSpray) -> Section | None:
     pictures = [
         Picture(
             patternation_figure(one),
-            f"Patternation {one.at_mm:.3g} mm from the nozzle, a slice of {one.thickness_mm:.3g} mm, {one.n} droplets. "
-            "Left: liquid by cells as seen from downstream, grey where the box does not reach; "
-            f"{one.azimuths[1]} is at 90°. Right: shares of the sectors, 95 % intervals.",
+            f"Patternation {one.at_mm:.3g} mm from the nozzle, a slice of {one.thickness_mm:.3g} mm, "
+            f"{counted(one.n, 'droplet')}. Left: liquid by cells as seen from downstream, grey where the box does not "
+            f"reach; {one.azimuths[1]} is at 90°. Right: shares of the sectors, 95 % intervals.",
             svg=True,
         )
         for one in found

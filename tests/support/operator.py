@@ -5,6 +5,8 @@ from contextlib import suppress
 
 from playwright.sync_api import Locator, Page, expect
 
+from daq.counted import counted
+
 expect.set_options(timeout=120_000)
 PROCESSED_MS = 180_000
 """Processing is last in line for processors: on a busy machine it takes its time."""
@@ -54,7 +56,7 @@ def drive_the_page(page: Page, base_url: str, views: tuple[str, ...], shots: int
     _is_refused(page, shots)
     press_for_light(page.get_by_role("button", name="Start run"))
     counts = page.get_by_role("status", name="run counts")
-    expect(counts).to_have_text(f"{shots} / {shots} shots recorded, {shots} valid", timeout=PROCESSED_MS)
+    expect(counts).to_have_text(f"{shots} / {counted(shots, 'shot')} recorded, {shots} valid", timeout=PROCESSED_MS)
     expect(page.get_by_label("run outcome")).to_have_text("completed")
     expect(page.get_by_role("log")).to_contain_text("shot 0 recorded")
     for view in views:  # its lamp is green for seconds only, however long the page takes to get here

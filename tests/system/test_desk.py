@@ -265,7 +265,7 @@ def test_no_words_of_the_page_are_cut(page: Page, server: Serving, width: int) -
     expect(live.get_by_role("button", name="Keep shot")).to_be_visible()
     open_drawer(page)
     words = page.locator(".q-field__label, [role=log] *, .live-caption")
-    expect(page.get_by_role("log")).to_contain_text("single-shot: idle, 1 of 1 shots recorded, 1 valid")
+    expect(page.get_by_role("log")).to_contain_text("single-shot: idle, 1 of 1 shot recorded, 1 valid")
     cut = words.evaluate_all(
         "found => found.filter(one => one.scrollWidth > one.clientWidth + 1).map(one => one.innerText)"
     )

@@ -151,7 +151,7 @@ def test_what_no_device_knows_travels_with_the_run(tab: Page, server: Serving) -
         tab.get_by_label(label).fill(text)
     tab.get_by_label("Remark").fill("windows cleaned")
     press_for_light(tab.get_by_role("button", name="Start run"))
-    expect(tab.get_by_role("status", name="run counts")).to_have_text("1 / 1 shots recorded, 1 valid")
+    expect(tab.get_by_role("status", name="run counts")).to_have_text("1 / 1 shot recorded, 1 valid")
     run_id = server.wait().run_id
     notes = server.http.get(f"/api/runs/{run_id}/header").json()["notes"]
     wanted = {"operator": "ann", "fluid": "water", "nozzle": "N 3", "pressure_bar": 40, "remark": "windows cleaned"}

@@ -8,6 +8,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from daq.counted import counted
 from processing.benchmarks import targets
 from processing.benchmarks.baseline import Timing, measure_once
 from processing.benchmarks.targets import Measured
@@ -31,7 +32,7 @@ def previews(run: RecordedRun, folder: Path, threads: int) -> Iterator[Measured]
     for _ in reconstruct_shots(run.run_dir, shots, calibration, run.settings, out, threads=threads, keep=keep_preview):
         pass
     wall_s, cpu_s = time.perf_counter() - wall_s, time.process_time() - cpu_s
-    yield Measured(targets.CHAIN_CPU, cpu_s / run.shots, how=f"{run.shots} shots")
+    yield Measured(targets.CHAIN_CPU, cpu_s / run.shots, how=counted(run.shots, "shot"))
     yield Measured(targets.CHAIN_CORES, cpu_s / wall_s)
 
 
@@ -39,8 +40,8 @@ def average(run: RecordedRun, folder: Path, _threads: int) -> Iterator[Measured]
     """The command, from its first import to its end."""
     mean = ["-o", str(folder / "mean.vtkhdf"), "--overwrite", run.grid_option]
     cost = cost_of(["average", str(run.run_dir), "--calibration", str(run.calibration_file), *mean])
-    yield Measured(targets.AVERAGE_CPU, cost.cpu_s, how=f"{run.shots} shots")
-    yield Measured(targets.AVERAGE_MEMORY, cost.peak_gb, how=f"{run.shots} shots")
+    yield Measured(targets.AVERAGE_CPU, cost.cpu_s, how=counted(run.shots, "shot"))
+    yield Measured(targets.AVERAGE_MEMORY, cost.peak_gb, how=counted(run.shots, "shot"))
 
 
 def slices(run: RecordedRun, _folder: Path, threads: int) -> Iterator[Measured]:

@@ -16,6 +16,7 @@ from typing import Any
 
 from websockets.sync.client import connect
 
+from daq.counted import counted
 from daq.run.state import RunState
 from processing.benchmarks import targets
 from processing.benchmarks.targets import Measured
@@ -104,7 +105,8 @@ def _asked(server: Server, config: Path, calibration: str, time_s: float) -> Mea
         waits_ms.append(1000 * (time.perf_counter() - began_s))
         time.sleep(_ASK_S)
     done = sum(job["state"] == JobState.DONE for job in server.ask("jobs"))
-    how = f"{len(waits_ms)} times, median {median(waits_ms):.2g} ms; shots at {RECORDED_HZ:g} Hz, {done} volumes made"
+    work = f"shots at {RECORDED_HZ:g} Hz, {counted(done, 'volume')} made"
+    how = f"{len(waits_ms)} times, median {median(waits_ms):.2g} ms; {work}"
     return Measured(targets.ASKED, quantiles(waits_ms, n=20)[-1], how=how)
 
 

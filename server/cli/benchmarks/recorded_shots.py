@@ -7,6 +7,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from daq.counted import counted
 from daq.files.run_directory import RunReader
 from daq.run.acquisition import Acquisition
 from daq.run.events import RunEvent, ShotRecorded
@@ -30,7 +31,7 @@ def recorded_shots(directory: Path | None, shots: int) -> Iterator[Measured]:
         with TemporaryDirectory(dir=directory) as folder:
             config = load_config(rig_in(Path(folder), bits, still=True))
             cpu_s, how = _recorded(config, shots, rate_hz)
-        yield Measured(target, cpu_s, how=f"{shots} shots, {how}")
+        yield Measured(target, cpu_s, how=f"{counted(shots, 'shot')}, {how}")
 
 
 def _recorded(config: RigConfig, shots: int, rate_hz: float) -> tuple[float | None, str]:

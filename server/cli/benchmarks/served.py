@@ -17,6 +17,7 @@ from urllib.request import Request, urlopen
 
 import numpy as np
 
+from daq.counted import counted
 from daq.files.run_directory import (
     DoubleFrame,
     ExposureRecord,
@@ -105,7 +106,8 @@ def server_start(directory: Path | None, runs: int = RUNS) -> Iterator[Measured]
                 up_s = time.perf_counter() - server.begun_s
                 server.ask("runs")
                 listed_s.append(time.perf_counter() - server.begun_s)
-        how = f"{runs} runs; they are listed after {listed_s[1]:.2g} s, without an index after {listed_s[0]:.2g} s"
+        listed = f"listed after {listed_s[1]:.2g} s, without an index after {listed_s[0]:.2g} s"
+        how = f"{counted(runs, 'run')}; they are {listed}"
         yield Measured(targets.START, up_s, how=how)
 
 

@@ -4,6 +4,7 @@ from argparse import Namespace
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
+from daq.counted import counted
 from server.cli.chosen_shots import selected_shots
 from server.cli.options import Verbs, add_calibrated_run, add_shots, add_verb
 from server.cli.output import Outcome, progress, table, tracked
@@ -84,7 +85,7 @@ def _finding(measured: "ShotCheck") -> str:
 def views_table(result: dict[str, Any]) -> str:
     """A line per view over all shots that tell, and the verdict, for people."""
     told = [shot for shot in result["shots"] if shot["views"]]
-    verdict = f"{len(told)} of {len(result['shots'])} shots tell: {result['verdict'] or 'no verdict'}"
+    verdict = f"{len(told)} of {counted(len(result['shots']), 'shot')} tell: {result['verdict'] or 'no verdict'}"
     limits = f"alarm above {result['alarm_px']:g} px, stop above {result['stop_px']:g} px"
     if not told:
         return f"{verdict}; {limits}"

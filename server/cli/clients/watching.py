@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from daq.counted import counted
 from server.cli.clients.server_option import named
 from server.cli.output import Bar, Outcome, progress
 from tomoshadow.client.values import read
@@ -48,6 +49,7 @@ def _shot(told: Mapping[str, Any]) -> tuple[int, bool]:
 
 
 def _told(run: "Run") -> Outcome:
-    counts = f"{run.shots_recorded} of {run.shots_planned} shots recorded, {run.shots_valid} valid"
+    planned = run.shots_recorded if run.shots_planned is None else run.shots_planned
+    counts = f"{run.shots_recorded} of {counted(planned, 'shot')} recorded, {run.shots_valid} valid"
     text = f"run {run.run_id}: {run.outcome}, {counts}{f'; {run.cause}' if run.cause else ''}"
     return Outcome({"passed": run.outcome == "completed", **asdict(run)}, text)

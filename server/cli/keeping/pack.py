@@ -2,9 +2,9 @@
 
 from argparse import Namespace
 
+from daq.counted import counted
 from server.cli.options import Verbs, add_out, add_verb, run_directory
 from server.cli.output import Outcome
-from server.reports.digits import counted
 
 
 def add(verbs: Verbs) -> None:

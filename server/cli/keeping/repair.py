@@ -2,6 +2,7 @@
 
 from argparse import Namespace
 
+from daq.counted import counted
 from server.cli.keeping.verify import require_run, text_of, told_of
 from server.cli.options import Verbs, add_verb, run_directory
 from server.cli.output import Outcome, progress
@@ -26,4 +27,4 @@ def repair(options: Namespace) -> Outcome:
         done.append(step)
     left = verify(options.run)
     result = {"passed": left.sound, "run": str(options.run), "done": done, **told_of(left)}
-    return Outcome(result, f"{options.run}: {len(done)} things were done; {text_of(left)}")
+    return Outcome(result, f"{options.run}: {counted(len(done), 'thing')} done; {text_of(left)}")

@@ -5,6 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from daq.counted import counted
 from server.cli.options import Verbs, add_verb, run_directory
 from server.cli.output import Bar, Outcome
 
@@ -45,7 +46,8 @@ def told_of(found: "Verification") -> dict[str, Any]:
 
 def text_of(found: "Verification") -> str:
     """What was found, for people."""
-    counts = f"{found.sound_shots} of {found.shots} shots are sound, {found.frames} frames, {found.outcome or 'open'}"
+    sound = f"{found.sound_shots} of {counted(found.shots, 'shot')} sound"
+    counts = f"{sound}, {counted(found.frames, 'frame')}, {found.outcome or 'open'}"
     return "\n  ".join([counts, *(f"{flaw.kind.replace('_', ' ')}: {flaw.text}" for flaw in found.flaws)])
 
 

@@ -2,9 +2,10 @@
 
 from typing import Any
 
+from daq.counted import counted
 from server.cli.options import describe_grid
 from server.cli.output import table
-from server.reports.digits import counted, digits_of_interval
+from server.reports.digits import digits_of_interval
 
 
 def droplets_table(result: dict[str, Any]) -> str:
@@ -86,7 +87,7 @@ def _mean_velocity(velocity: dict[str, Any]) -> str:
     if velocity["mean_m_s"] is None:
         return f"no velocity: {velocity['reason']}"
     components = (f"{name} {_with_interval(estimate)}" for name, estimate in velocity["mean_m_s"].items())
-    return "; ".join([f"{velocity['pairs']} pairs, {', '.join(components)} m/s", *velocity["doubts"]])
+    return "; ".join([f"{counted(velocity['pairs'], 'pair')}, {', '.join(components)} m/s", *velocity["doubts"]])
 
 
 def _with_interval(estimate: dict[str, float]) -> str:

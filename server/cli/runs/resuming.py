@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from daq.counted import counted
 from daq.files.atomic_file import PART_SUFFIX
 from server.cli.output import progress
 
@@ -21,7 +22,8 @@ def resumable(out: Path, shots: Sequence[int], files: Callable[[int], Sequence[P
         for file in _all_files(shots[done:], files):
             file.unlink(missing_ok=True)
         if 0 < done < len(shots):
-            progress(f"{out}: keeps {done} shots of {len(shots)}; go on with --shots {shots[done]}:{shots[-1] + 1}")
+            go_on = f"--shots {shots[done]}:{shots[-1] + 1}"
+            progress(f"{out}: keeps {counted(done, 'shot')} of {len(shots)}; go on with {go_on}")
         raise
     finally:
         _remove_parts(out, {file.name for file in _all_files(shots, files)})

@@ -4,9 +4,9 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from daq.counted import counted
 from server.cli.options import Verbs, add_verb, positive
 from server.cli.output import Outcome
-from server.reports.digits import counted
 
 if TYPE_CHECKING:
     from processing.analysis.estimates import Estimate

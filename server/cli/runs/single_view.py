@@ -5,13 +5,14 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from daq.counted import counted
 from processing.runs.errors import PipelineError
 from server.cli.chosen_shots import selected_shots
 from server.cli.options import positive
 from server.cli.output import Outcome, progress, table, tracked
 from server.cli.runs.batch import over_runs
 from server.cli.runs.recipes import keeping_recipe, settings_of
-from server.reports.digits import counted, digits_of_interval
+from server.reports.digits import digits_of_interval
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -4,6 +4,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from daq.counted import counted
 from processing.analysis.velocity import HALF_WINDOW
 from server.cli.options import Verbs, add_out, add_verb, count, positive
 from server.cli.output import Outcome, progress
@@ -83,11 +84,12 @@ def _told(linked: "DropletTracks", shots: int, file: Path) -> dict[str, Any]:
 
 
 def _summary(result: dict[str, Any]) -> str:
+    seen = f"{counted(result['droplets'], 'droplet')} of {counted(result['shots'], 'shot')}"
     if result["reason"]:
-        nothing = f"{result['droplets']} droplets of {result['shots']} shots: {result['reason']}"
-        return "\n".join([nothing, *result["doubts"]])
-    tracked = f"{100 * result['share_tracked']:.1f} % of {result['droplets']} droplets of {result['shots']} shots"
-    told = f"{result['tracks']} tracks with {tracked}, {result['median_length']:g} in a median one; {result['file']}"
+        return "\n".join([f"{seen}: {result['reason']}", *result["doubts"]])
+    tracked = f"{100 * result['share_tracked']:.1f} % of {seen}"
+    tracks = f"{counted(result['tracks'], 'track')} with {tracked}"
+    told = f"{tracks}, {result['median_length']:g} in a median one; {result['file']}"
     return "\n".join([told, *_proposed(result), *result["doubts"]])
 
 

@@ -3,6 +3,7 @@
 from argparse import Namespace
 from pathlib import Path
 
+from daq.counted import counted
 from server.cli.options import Verbs, add_out, add_verb
 from server.cli.output import Outcome
 from server.cli.spray.spray_options import add_sprays, asked_for
@@ -27,4 +28,4 @@ def report(options: Namespace) -> Outcome:
     with replacing(options.out) as part:
         write_spray_report(part, reported)
     result = {"report": str(options.out), "results": spray.name, "shots": len(spray.shots)}
-    return Outcome(result, f"{options.out}: {reported.told.droplets.n} droplets, shots: {len(spray.shots)}")
+    return Outcome(result, f"{options.out}: {counted(reported.told.droplets.n, 'droplet')}, shots: {len(spray.shots)}")

@@ -3,6 +3,7 @@
 from argparse import Namespace
 from typing import TYPE_CHECKING, Any
 
+from daq.counted import counted
 from server.cli.options import Verbs, add_verb
 from server.cli.output import Outcome, table
 from server.cli.spray.spray_options import add_sprays, asked_for
@@ -67,9 +68,9 @@ def _compare(options: Namespace) -> Outcome:
 def _text(spray: "MeasuredSpray", told: "SprayStatistics") -> str:
     from server.reports.spray_tables import doubts, figure_rows
 
-    counted = f"{told.droplets.n} droplets, shots: {told.droplets.shots}, exposures: {told.droplets.exposures}"
+    seen = f"{counted(told.droplets.n, 'droplet')}, shots: {told.droplets.shots}, exposures: {told.droplets.exposures}"
     sample = f"; sample: {told.sample.verdict}" if told.sample else ""
-    head = f"{spray.name}: {counted}; sampling: {told.sampling}{sample}"
+    head = f"{spray.name}: {seen}; sampling: {told.sampling}{sample}"
     return "\n".join([head, table(["", "", "95 %"], figure_rows(told)), *doubts(told), *spray.changes])
 
 

@@ -20,6 +20,7 @@ from uuid import uuid4
 from distributed import Future
 from distributed.scheduler import KilledWorker
 
+from daq.counted import counted
 from server.lab.engine.in_worker import Errand, perform_errand
 from server.lab.engine.path_map import PathMap, as_seen_by_workers
 from server.lab.engine.scheduler_link import CONNECT_S, SchedulerLink, silent
@@ -205,6 +206,6 @@ async def _fetched(future: "Future[Any]") -> _Told:
 
 def _deadly(job_id: str, error: KilledWorker) -> str:
     return (
-        f"{job_id}: {error.allowed_failures + 1} workers died while they did it, the last was "
+        f"{job_id}: {counted(error.allowed_failures + 1, 'worker')} died while doing it, the last was "
         f"{error.last_worker.address}: do they have too little memory (tomoshadow worker --memory)?"
     )

@@ -3,6 +3,7 @@
 from functools import lru_cache
 from pathlib import Path
 
+from daq.counted import counted
 from daq.files.run_directory import RunReader, Shot, ShotFileError
 from daq.files.run_file import shot_path
 from daq.run.shots.shot_check import check_exposures
@@ -32,7 +33,7 @@ def shot_of(run: RunReader, index: int) -> Shot:
 
 def _shot(run: RunReader, index: int) -> Shot:
     if index >= run.shot_count:
-        raise NotFound(f"run {run.run_dir.name} has {run.shot_count} shots, not {index}")
+        raise NotFound(f"run {run.run_dir.name} has {counted(run.shot_count, 'shot')}, not {index}")
     path = shot_path(run.run_dir, index)
     return _read(run.run_dir, index, path.stat().st_mtime_ns) if path.is_file() else run.read_shot(index)
 

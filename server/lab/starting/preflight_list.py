@@ -9,6 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from daq.counted import counted
 from daq.files.header import ViewFormat
 from daq.frozen_model import FrozenModel
 from daq.run.preflight import FRAMES_PER_SHOT
@@ -138,7 +139,7 @@ def _disk(context: Context, plan: RunPlan) -> Told:
 
 def _stage(_context: Context, plan: RunPlan) -> Told | None:
     z_mm = plan.stage_z_mm
-    return (f"{len(z_mm)} positions, {min(z_mm):g} to {max(z_mm):g} mm", "") if z_mm else None
+    return (f"{counted(len(z_mm), 'position')}, {min(z_mm):g} to {max(z_mm):g} mm", "") if z_mm else None
 
 
 def _references(context: Context, plan: RunPlan) -> Told | None:

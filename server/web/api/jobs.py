@@ -6,6 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 from pydantic import Field
 
+from daq.counted import counted
 from daq.frozen_model import FrozenModel
 from daq.names import Identifier
 from processing.reconstruction.settings import ReconstructionSettings
@@ -104,7 +105,7 @@ def _queued_once(
 
     def queued() -> list[str]:
         ids = [job.id for job in queue()]
-        tell_deed(context, who, f"asked for {what.partition(' ')[0]} of {len(ids)} shots")
+        tell_deed(context, who, f"asked for {what.partition(' ')[0]} of {counted(len(ids), 'shot')}")
         return ids
 
     return [context.jobs.get(job_id) for job_id in context.once.do(key, what, queued)]

@@ -550,7 +550,7 @@ def test_an_impossible_plan_is_refused_with_its_reason(lab: Laboratory, case: st
 def test_a_run_that_the_disk_does_not_hold_is_refused_with_both_numbers(lab: Laboratory) -> None:
     lab.memory.cameras["view1"].image_shape = (60_000, 60_000)
     with pytest.raises(
-        PlanError, match=r"100000 shots of \d+ bytes need \d+ bytes on the disk of .*, \d+ bytes are free"
+        PlanError, match=r"100000 shots of \d+ bytes, in all \d+ bytes, do not fit the disk of .*: \d+ bytes are free"
     ):
         lab.acquisition.start(plan_of(100_000))
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from server.reports.digits import counted, digits_of_interval
+from server.reports.digits import digits_of_interval
 
 
 @pytest.mark.parametrize(
@@ -20,7 +20,3 @@ from server.reports.digits import counted, digits_of_interval
 )
 def test_a_narrow_interval_is_seen(told: tuple[float, float, float], texts: tuple[str, str, str]) -> None:
     assert digits_of_interval(*told) == texts
-
-
-def test_one_thing_is_not_many() -> None:
-    assert [counted(number, "shot") for number in (0, 1, 2)] == ["0 shots", "1 shot", "2 shots"]

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from nicegui import ui
 
+from daq.counted import counted
 from server.lab.duty import Health, Lamp
 
 
@@ -40,7 +41,7 @@ def sum_of(lamps: Sequence[Lamp]) -> str:
     faults = sum(lamp.health is Health.FAULT for lamp in lamps)
     warnings = sum(lamp.health is Health.WARN for lamp in lamps)
     if faults:
-        return f"{faults} fault{'s' if faults > 1 else ''}"
+        return counted(faults, "fault")
     return f"{warnings} of {len(lamps)} amber" if warnings else f"{len(lamps)} ok"
 
 

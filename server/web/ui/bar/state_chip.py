@@ -2,6 +2,7 @@
 
 from nicegui import ui
 
+from daq.counted import counted
 from server.lab.desk.rig_state import RigState, RigWord
 
 _COLOURS = {
@@ -57,4 +58,4 @@ class StateChip:
 def in_brief(state: RigState, alarms: int) -> str:
     """The state without reason and remaining time, and how many alarms are loud, for the narrow tab of a browser."""
     told = state.text.partition(":" if state.state is RigWord.NOT_READY else ",")[0]
-    return f"{told}, {alarms} alarm{'s' if alarms > 1 else ''}" if alarms else told
+    return f"{told}, {counted(alarms, 'alarm')}" if alarms else told

@@ -6,6 +6,7 @@ from typing import Any
 
 from nicegui import ui
 
+from daq.counted import counted
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.calibration.verdict import BELONGING, Verdict
 from processing.runs.exposure_faults import fault_lines
@@ -128,7 +129,7 @@ def _quality(job: Job) -> str:
 
 def _unchecked(things: int) -> list[str]:
     """How many there are; the page Calibrate has their sentences, which are long."""
-    return [f"not checked: {things} thing{'s' if things > 1 else ''}, see Calibrate"] if things else []
+    return [f"not checked: {counted(things, 'thing')}, see Calibrate"] if things else []
 
 
 def _holdout_px(view: dict[str, Any]) -> float:
@@ -179,7 +180,7 @@ def _found(job: Job) -> str:
     """Droplets, verdict and reasons of a measurement; nothing before it has ended."""
     if not job.result:
         return ""
-    return "; ".join([f"{job.result['droplets']} droplets, {job.result['verdict']}", *job.result["reasons"]])
+    return "; ".join([f"{counted(job.result['droplets'], 'droplet')}, {job.result['verdict']}", *job.result["reasons"]])
 
 
 _DETAIL = {

@@ -7,6 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
+from daq.counted import counted
 from processing.analysis.estimates import Estimate
 from server.lab.droplets.measured import MeasuredRun, measured_run
 from server.lab.errors import ServerError
@@ -61,7 +62,7 @@ def droplet_row(run: MeasuredRun) -> dict[str, str]:
     """Cells of a result set: each number with its interval, or why there is none."""
     statistics, shots = run.statistics, told_shots([one.shot for one in run.shots])
     return {
-        "droplets": f"{statistics.n} in {statistics.exposures} exposures of {shots}",
+        "droplets": f"{statistics.n} in {counted(statistics.exposures, 'exposure')} of {shots}",
         "density": _told(statistics.number_density_per_mm3, statistics.number_density_reason),
         "d32": _told(statistics.d32_um, statistics.reason),
         "ghosts": _told(statistics.ghost_share, statistics.ghost_reason, _percent),
@@ -74,7 +75,8 @@ def told_shots(shots: Sequence[int]) -> str:
     if len(shots) == 1:
         return f"shot {shots[0]}"
     low, high = min(shots), max(shots)
-    return f"shots {low} to {high}" if high - low + 1 == len(shots) else f"{len(shots)} shots from {low} to {high}"
+    told = "shots" if high - low + 1 == len(shots) else f"{counted(len(shots), 'shot')} from"
+    return f"{told} {low} to {high}"
 
 
 def _told(estimate: Estimate | None, reason: str | None, written: Callable[[float], str] = "{:.3g}".format) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
+from daq.counted import counted
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from server.web.ui.results.slice_group import Dots
 from server.web.ui.theme import panel
@@ -62,7 +63,7 @@ class DropletTable:
         rows = [row | {"leads": leads} for row in droplet_rows(droplets)] if droplets else []
         self._panel.set_visibility(droplets is not None)
         where = "a row leads to its place" if leads else "choose volumes above to see where they lie"
-        self._count.set_text(f"{len(droplets.columns['frame']) if droplets else 0} droplets; {where}")
+        self._count.set_text(f"{counted(len(rows), 'droplet')}; {where}")
         self._table.rows = rows
         self._table.update()
 

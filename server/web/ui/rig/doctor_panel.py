@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from nicegui import ui
 
+from daq.counted import counted
 from server.doctor.checkup import Checkup, Status
 from server.lab.devices.rig_doctor import examine
 from server.lab.services import Context
@@ -63,7 +64,7 @@ def summary_of(found: Sequence[Checkup]) -> str:
     """All findings in a few words."""
     counts = {status: sum(one.status is status for one in found) for status in Status}
     told = [f"{counts[status]} {word}" for status, word in ((Status.FAIL, "failed"), (Status.WARN, "to look at"))]
-    return f"{len(found)} things looked at: {', '.join(told)}"
+    return f"{counted(len(found), 'thing')} looked at: {', '.join(told)}"
 
 
 def _show(one: Checkup) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
+from daq.counted import counted
 from daq.run.references import REFERENCE_KINDS
 from daq.run_plan import RunKind
 from server.lab.errors import NotFound
@@ -132,5 +133,5 @@ def newest_of(runs: list[RunSummary]) -> dict[RunKind, str]:
 
 
 def _label(run: RunSummary) -> str:
-    told = run.outcome if run.shots_valid is None else f"{run.shots_valid} shots"
+    told = run.outcome if run.shots_valid is None else counted(run.shots_valid, "shot")
     return f"{run.kind}: {run.name}, {told}, {run.run_id}"

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 from nicegui import ui
 
+from daq.counted import counted
 from daq.errors import DaqError
 from daq.run.events import RunStatus
 from daq.run.state import RunState
@@ -106,7 +107,7 @@ def counts_text(status: RunStatus, eta_s: float | None = None) -> str:
     if status.run_id is None:
         return ""
     invalid = status.shots_recorded - status.shots_valid
-    text = f"{status.shots_recorded} / {status.shots_planned} shots recorded, {status.shots_valid} valid"
+    text = f"{status.shots_recorded} / {counted(status.shots_planned, 'shot')} recorded, {status.shots_valid} valid"
     text = f"{text}, {invalid} INVALID" if invalid else text
     return text if eta_s is None else f"{text}; {minutes(eta_s)} left"
 

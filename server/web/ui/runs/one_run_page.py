@@ -136,7 +136,7 @@ class OneRunPage:
         self._outcome.set_text(run.outcome)
         self._outcome.props(f"color={run_colour(run)}")
         shots = shots_text(run)
-        valid = shots if run.outcome == ACTIVE or not shots else f"{shots} shots valid"
+        valid = shots if run.outcome == ACTIVE or not shots else f"valid shots: {shots}"
         named = [f"calibration {run.calibration}"] if run.calibration else []
         named += [f"references {', '.join(run.references)}"] if run.references else []
         told = (run.kind or "", local_time(run.created_utc), valid, *named)

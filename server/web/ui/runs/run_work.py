@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
+from daq.counted import counted
 from daq.run_plan import RunKind
 from processing.reconstruction.choices import Accuracy, VoxelType
 from processing.reconstruction.choices import ReconstructionMethod as Method
@@ -95,7 +96,7 @@ def can_be_worked_on(run: RunSummary) -> bool:
 def progress_text(one: WorkProgress) -> str:
     """How far a result set is."""
     failed = f", {one.failed} failed or aborted" if one.failed else ""
-    return f"{one.results_id}: {one.done} of {one.shots} shots done{failed}"
+    return f"{one.results_id}: {one.done} of {counted(one.shots, 'shot')} done{failed}"
 
 
 def _choice(label: str, options: dict[str, str], value: str) -> ui.select:

@@ -216,4 +216,4 @@ def test_people_get_a_line_per_view() -> None:
         "3 of 4 shots tell: refuse; alarm above 0.3 px, stop above 0.8 px",
     ]
     silent = {**result, "shots": [{"views": {}}], "verdict": None}
-    assert views_table(silent) == "0 of 1 shots tell: no verdict; alarm above 0.3 px, stop above 0.8 px"
+    assert views_table(silent) == "0 of 1 shot tell: no verdict; alarm above 0.3 px, stop above 0.8 px"
