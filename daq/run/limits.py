@@ -11,6 +11,8 @@ class AcquisitionLimits:
     ----------
     frame_s : float
         Time for the network, after the cycle of the slowest camera, until an exposure counts as missing.
+    patience_s : float
+        For cameras that re-base or are late with their frames, which takes milliseconds, until the light is off.
     light_off_s : float
         Until the generator must have confirmed that the light is off.
     disarm_s : float
@@ -30,6 +32,7 @@ class AcquisitionLimits:
     """
 
     frame_s: float = 1.0
+    patience_s: float = 0.2
     light_off_s: float = 2.0
     disarm_s: float = 5.0
     drain_s: float = 60.0

@@ -125,13 +125,16 @@ def eventually(condition: Callable[[], bool], otherwise: Callable[[], object]) -
         threading.Event().wait(0.1)
 
 
+LIMITS = AcquisitionLimits(frame_s=2.0)
+
+
 def _as_it_is(rig: Rig) -> Rig:
     return rig
 
 
 @contextmanager
 def serving_bench(
-    config: RigConfig, frame_s: float = 2.0, watch: Callable[[Rig], Rig] = _as_it_is
+    config: RigConfig, limits: AcquisitionLimits = LIMITS, watch: Callable[[Rig], Rig] = _as_it_is
 ) -> Iterator[BenchServing]:
     """Serve a simulated bench until the block ends; who watches its devices stands between them and all others."""
     events, data_dir = EventPublisher(), config.server.data_dir
@@ -141,7 +144,7 @@ def serving_bench(
             rig := watch(assembled.rig),
             data_dir,
             events.publish_run_event,
-            limits=AcquisitionLimits(frame_s=frame_s),
+            limits=limits,
             observers=assembled.observers,
         ) as acquisition,
         listening(

@@ -20,11 +20,12 @@ from typing import Any
 import numpy as np
 
 from daq.faults import LABORATORY_FAULTS, LASTING_FAULTS, FaultKind
+from daq.run.limits import AcquisitionLimits
 from server.cli.output import endable, table
 from tests.support.simulated_serving import BenchServing, eventually, serving_bench, tiny_config
 from tests.support.watched_rig import Darkness, Witness
 
-FRAME_S = 0.3
+LIMITS = AcquisitionLimits(frame_s=0.3)
 """A camera that is silent for longer is a fault."""
 LIMIT_S = 3.0
 """What has not led to darkness by then does not end a run."""
@@ -92,7 +93,7 @@ def _is_sound(bench: BenchServing) -> bool:
 def try_all(folder: Path, rounds: int, tell: Callable[[Darkened], None]) -> None:
     """Every kind of fault so many times."""
     witness = Witness()
-    with serving_bench(tiny_config(folder / "runs", subnet=9), FRAME_S, witness.watch) as bench:
+    with serving_bench(tiny_config(folder / "runs", subnet=9), LIMITS, witness.watch) as bench:
         bench.laboratory.witnesses.append(witness.see_pulse)
         for _ in range(rounds):
             for kind in KINDS:

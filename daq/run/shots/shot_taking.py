@@ -20,9 +20,6 @@ from daq.shot import DoubleFrame, FiredTrain, Shot
 _SLICE_S = 0.02
 """How often is looked whether something ends a shot whose frames have not all come."""
 
-_PATIENCE_S = 0.2
-"""For cameras that re-base, or are late with their frames, before the light is switched off; they need milliseconds."""
-
 _ANSWER_LIMIT_S = 2.0
 """For cameras of which nothing came, in the dark; each gives up on the answer itself before."""
 
@@ -71,6 +68,7 @@ class ShotTaker:
         self._wait_for = run.progress.wait_for
         self._thresholds = thresholds
         self._frame_deadline_s = round(self._timing.shortest_period_ns / 1e9 + run.limits.frame_s, 2)
+        self._patience_s = run.limits.patience_s
         self._refires_left = self._plan.refire_quota
         self._period_s = 1 / self._plan.rate_hz
         self._shortest_s = self._timing.shortest_period_ns / 1e9
@@ -136,7 +134,7 @@ class ShotTaker:
     def _rebase(self) -> None:
         """Let the cameras tell the next firing from the last one; they read their clocks."""
         rebasing = SideBySide("begin shot", _begin_shot, self._rig.cameras)
-        if not rebasing.wait(_PATIENCE_S):
+        if not rebasing.wait(self._patience_s):
             self._darken()
         _raise_first(rebasing.errors(self._frame_deadline_s))
 
@@ -161,7 +159,7 @@ class ShotTaker:
     def _collect(self, index: int) -> dict[str, DoubleFrame] | None:
         """Collect the exposures of all views before one common deadline; None if the run ends at once."""
         collecting = SideBySide("frames", self._frames_of, self._rig.cameras)
-        too_late_s = time.monotonic() + self._frame_deadline_s + _PATIENCE_S
+        too_late_s = time.monotonic() + self._frame_deadline_s + self._patience_s
         self._tell_missing(index, collecting)
         while not (collecting.wait(_SLICE_S) or collecting.has_failed or time.monotonic() > too_late_s):
             self._tell_missing(index, collecting)
