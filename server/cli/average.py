@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from processing.reconstruction.mean_line_of_sight import MeanVolume
     from processing.reconstruction.settings import ReconstructionSettings
     from processing.runs.results_file import Provenance
+    from processing.runs.stored_exposures import StoredExposure
     from processing.runs.volumes.run_average import RunAverage
     from processing.runs.workbench import Workbench
     from processing.volume import VoxelGrid
@@ -96,12 +97,19 @@ def _average_results(options: Namespace) -> dict[str, Any]:
     told = [told for one in exposures if (told := stored_faults(one, averaged.copies.get(one.file)))]
     faults = with_odd(told, stored_meetings(exposures))
     light = light_line(stored_shares(exposures), stored_settings(exposures[0]))
-    if (belonging := stored_belonging(exposures)) is None:
-        return {**_written(options, mean, grid, len(files), faults, {}), "light": light}
-    if belonging["verdict"] in ("warn", "refuse"):
-        progress(f"{options.results}: droplets speak against calibration and run: {belonging['verdict']}")
-    written = _written(options, mean, grid, len(files), faults, {BELONGING: json.dumps(belonging)})
-    return {"passed": belonging["verdict"] != "refuse", "belonging": belonging, **written, "light": light}
+    belonging = _told_belonging(options.results, exposures)
+    made_by = {BELONGING: json.dumps(belonging)} if belonging else {}
+    written = _written(options, mean, grid, len(files), faults, made_by)
+    told_of_it = {"passed": belonging["verdict"] != "refuse", "belonging": belonging} if belonging else {}
+    return {**told_of_it, **written, "light": light}
+
+
+def _told_belonging(results: Path, exposures: "Sequence[StoredExposure]") -> dict[str, Any] | None:
+    """The worst record that the volumes carry; where it speaks against them, a person is told."""
+    belonging = stored_belonging(exposures)
+    if belonging and belonging["verdict"] in ("warn", "refuse"):
+        progress(f"{results}: droplets speak against calibration and run: {belonging['verdict']}")
+    return belonging
 
 
 def _average_run(options: Namespace) -> dict[str, Any]:

@@ -15,8 +15,11 @@ from processing.runs.errors import PipelineError
 from server.cli.output import Outcome, progress
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from processing.calibration.calibration import Calibration
     from processing.reconstruction.settings import FrozenValue, ReconstructionSettings
+    from processing.volume import VoxelGrid
 
 Verbs: TypeAlias = "_SubParsersAction[ArgumentParser]"
 Command = Callable[[Namespace], Outcome]
@@ -207,6 +210,12 @@ def calibrated_share(options: Namespace, settings: "ReconstructionSettings", cal
         )
     elif share < LEAST_SHARE:
         progress(f"the grid holds {share:.1g} of the calibrated volume: is it in mm, and where the target was?")
+    _tell_beyond(grid, ranges_mm)
+    return share
+
+
+def _tell_beyond(grid: "VoxelGrid", ranges_mm: "Sequence[tuple[float, float]]") -> None:
+    """Where the grid reaches beyond the target."""
     for axis, (low, high), along_mm in zip("xyz", ranges_mm, (grid.x_mm, grid.y_mm, grid.z_mm), strict=True):
         beyond_mm = max(low - along_mm[0], along_mm[-1] - high)
         if beyond_mm > MOST_BEYOND * (high - low):
@@ -214,7 +223,6 @@ def calibrated_share(options: Namespace, settings: "ReconstructionSettings", cal
                 f"the grid reaches {beyond_mm:.3g} mm beyond the {axis} of the target, {low:.4g} to {high:.4g} mm: "
                 "nobody has checked the calibration there"
             )
-    return share
 
 
 def usable_processors() -> int:

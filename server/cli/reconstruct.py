@@ -31,10 +31,11 @@ from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, wit
 from server.cli.runs.resuming import resumable
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Mapping
+    from collections.abc import Generator, Mapping, Sequence
 
     from processing.reconstruction.settings import ReconstructionSettings
     from processing.runs.results_file import ExposureKey
+    from processing.runs.shots.meetings import Meetings
     from processing.runs.shots.shot_result import ShotResult
 
 NAME = "reconstruct"
@@ -128,9 +129,7 @@ def _reconstruct_shots(
     options: Namespace, settings: "ReconstructionSettings", run_dir: Path, indices: list[int], out: Path
 ) -> "tuple[list[ShotResult], Belonging]":
     from processing.calibration.calibration_file import load_calibration
-    from processing.runs.results_file import volume_files
-    from processing.runs.shots.meetings import pale_views, seldom_meeting, stored_meetings
-    from processing.runs.stored_exposures import stored_exposures
+    from processing.runs.shots.meetings import pale_views, seldom_meeting
     from processing.runs.volumes.pipeline import Options, reconstruct_shots
 
     calibration = load_calibration(options.calibration)
@@ -152,12 +151,21 @@ def _reconstruct_shots(
                 _tell_slow_views(shot)
             _tell_faults(shot)
             shots.append(shot)
-    made = {volume.file for shot in shots for volume in shot.volumes}
-    others = [file for file in volume_files(out) if file.name not in made][-MOST_COMPARED:]
-    meetings = stored_meetings(stored_exposures(others))
-    meetings |= {key: one for shot in shots for key, one in shot.meetings.items()}
+    meetings = _meetings(shots, out)
     pale, seldom = pale_views(meetings), [shot for shot in seldom_meeting(meetings) if shot in indices]
     return [_with_pale(shot, pale) for shot in shots], ask_seldom(belonging(), seldom, run_dir, calibration)
+
+
+def _meetings(shots: "Sequence[ShotResult]", out: Path) -> "Meetings":
+    """Of the exposures that were reconstructed now, and of some that lay there before."""
+    from processing.runs.results_file import volume_files
+    from processing.runs.shots.meetings import stored_meetings
+    from processing.runs.stored_exposures import stored_exposures
+
+    made = {volume.file for shot in shots for volume in shot.volumes}
+    others = [file for file in volume_files(out) if file.name not in made][-MOST_COMPARED:]
+    now = {key: one for shot in shots for key, one in shot.meetings.items()}
+    return stored_meetings(stored_exposures(others)) | now
 
 
 def _elsewhere(

@@ -105,14 +105,8 @@ def demonstrate(
     DaqError
         A run did not complete.
     """
-    config = _simulated_rig(config_file, firmware)
     watch = Stopwatch()
-    with hold_data_dir(out / "runs"), open_rig(config) as assembled:
-        recorder = _Runs(config, assembled, out / "runs", progress)
-        with watch.step("calibrate"):
-            calibration = _calibrate(recorder, out)
-        with watch.step("acquire"):
-            sample = _record_sample(recorder, shots, calibration)
+    calibration, sample = _recorded(_simulated_rig(config_file, firmware), out, shots, progress, watch)
     recorded, valid = _recorded_and_valid(sample)
     file, grid = calibration_path(out, calibration.id), default_grid(calibration, PITCH_MM)
     settings = ReconstructionSettings(grid=GridSettings.of(grid))
@@ -120,10 +114,7 @@ def demonstrate(
     with watch.step("reconstruct"):
         results = tuple(_reconstructed(sample, valid, file, settings, results_dir, progress))
     with watch.step("measure"):
-        progress(f"measuring the droplets of shot {valid[0]} in a box downstream of the break-up")
-        droplets = measure_droplets(sample, valid[0], calibration, file, sample / TRUTH_FILE)
-        progress("looking for ligaments and the break-up in exposure A of every shot")
-        liquid = measure_liquid(sample, valid, calibration, sample / TRUTH_FILE)
+        droplets, liquid = _measured(sample, valid, calibration, file, progress)
     with watch.step("judge"):
         progress("comparing with the truth")
         measured = read_files([droplets.file])
@@ -144,6 +135,28 @@ def demonstrate(
         shots_valid=len(results),
         seconds=watch.seconds,
     )
+
+
+def _recorded(
+    config: RigConfig, out: Path, shots: int, progress: Progress, watch: Stopwatch
+) -> tuple[Calibration, Path]:
+    """Calibrate, and record references and spray: the calibration, and the run of the spray."""
+    with hold_data_dir(out / "runs"), open_rig(config) as assembled:
+        recorder = _Runs(config, assembled, out / "runs", progress)
+        with watch.step("calibrate"):
+            calibration = _calibrate(recorder, out)
+        with watch.step("acquire"):
+            return calibration, _record_sample(recorder, shots, calibration)
+
+
+def _measured(
+    sample: Path, valid: list[int], calibration: Calibration, file: Path, progress: Progress
+) -> tuple[MeasuredDroplets, MeasuredLiquid]:
+    """Droplets of the first shot, and liquid that is none in all shots, each beside the truth."""
+    progress(f"measuring the droplets of shot {valid[0]} in a box downstream of the break-up")
+    droplets = measure_droplets(sample, valid[0], calibration, file, sample / TRUTH_FILE)
+    progress("looking for ligaments and the break-up in exposure A of every shot")
+    return droplets, measure_liquid(sample, valid, calibration, sample / TRUTH_FILE)
 
 
 def _simulated_rig(config_file: Path, firmware: str | None) -> RigConfig:

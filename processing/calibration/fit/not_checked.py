@@ -33,38 +33,35 @@ def not_checked(
     shapeless : sequence of str
         Views whose model has no pixels that ought to be square.
     """
+    yield from _sides(undirected)
+    unplaced = [name for name in calibration_set.views if name not in calibration_set.azimuths_deg]
+    yield from _places(unplaced)
+    yield from _steps(calibration_set, unplaced, shapeless)
+    yield from _scales([name for name in calibration_set.views if name not in calibration_set.scales_px_per_mm])
+    yield from _units(shapeless)
+    yield from _pixels(calibration_set.unplaced_pixels)
+    if len(calibration_set.views) > 1:
+        yield DROPLETS
+    yield ALIKE
+
+
+def _sides(undirected: Sequence[str]) -> Iterator[Unchecked]:
+    """From which side views look."""
     if undirected:
         yield Unchecked(
             f"whether z and the images of {', '.join(undirected)} count the right way, as sights hardly diverge",
             "azimuth_deg of these views",
         )
-    if unplaced := [name for name in calibration_set.views if name not in calibration_set.azimuths_deg]:
+
+
+def _places(unplaced: Sequence[str]) -> Iterator[Unchecked]:
+    """Where views stand."""
+    if unplaced:
         yield Unchecked(
             f"where {', '.join(unplaced)} should stand: files of two cameras may be exchanged, or a camera turned; or "
             "all of them mirrored alike",
             f"azimuth_deg of {', '.join(unplaced)}",
         )
-    yield from _steps(calibration_set, unplaced, shapeless)
-    if unscaled := [name for name in calibration_set.views if name not in calibration_set.scales_px_per_mm]:
-        yield Unchecked(
-            f"whether the scale of {', '.join(unscaled)} is right: pitch_mm, z_mm, and their unit",
-            f"scale_px_per_mm of {', '.join(unscaled)}: magnification over pixel pitch",
-        )
-    if shapeless:
-        yield Unchecked(
-            f"whether x, y and z of {', '.join(shapeless)} are in one unit, and square to each other: a polynomial "
-            "fits a wrong pitch, step or travel of the stage as well as the right ones",
-            "--model pinhole once, which asks whether pixels are square",
-        )
-    if calibration_set.unplaced_pixels:
-        names = ", ".join(calibration_set.unplaced_pixels)
-        yield Unchecked(
-            f"whether u and v of {names} count from 0 in the middle of the first pixel, and v downwards, as in a run",
-            f"pixel_origin and v_axis of the points of {names}",
-        )
-    if len(calibration_set.views) > 1:
-        yield DROPLETS
-    yield ALIKE
 
 
 def _steps(calibration_set: CalibrationSet, unplaced: Sequence[str], shapeless: Sequence[str]) -> Iterator[Unchecked]:
@@ -81,4 +78,32 @@ def _steps(calibration_set: CalibrationSet, unplaced: Sequence[str], shapeless: 
             "whether z is in proportion to x and y, as steps of a stage are to the pitch of a target: cameras fit one "
             "that is some percent too long or too short everywhere",
             "azimuth_deg of two oblique views or more",
+        )
+
+
+def _scales(unscaled: Sequence[str]) -> Iterator[Unchecked]:
+    """How large everything is."""
+    if unscaled:
+        yield Unchecked(
+            f"whether the scale of {', '.join(unscaled)} is right: pitch_mm, z_mm, and their unit",
+            f"scale_px_per_mm of {', '.join(unscaled)}: magnification over pixel pitch",
+        )
+
+
+def _units(shapeless: Sequence[str]) -> Iterator[Unchecked]:
+    """Whether x, y and z are alike."""
+    if shapeless:
+        yield Unchecked(
+            f"whether x, y and z of {', '.join(shapeless)} are in one unit, and square to each other: a polynomial "
+            "fits a wrong pitch, step or travel of the stage as well as the right ones",
+            "--model pinhole once, which asks whether pixels are square",
+        )
+
+
+def _pixels(unplaced_pixels: Sequence[str]) -> Iterator[Unchecked]:
+    """How points of a table count pixels."""
+    if names := ", ".join(unplaced_pixels):
+        yield Unchecked(
+            f"whether u and v of {names} count from 0 in the middle of the first pixel, and v downwards, as in a run",
+            f"pixel_origin and v_axis of the points of {names}",
         )

@@ -74,22 +74,13 @@ def stated_roll(text: str) -> tuple[str, float]:
 
 def calibrate_views(options: Namespace) -> Outcome:
     """Fit, and write the calibration; it has not passed where a view is refused."""
-    from processing.calibration.calibrate import calibrate
-    from processing.calibration.sets.calibration_set import load_calibration_set
     from processing.calibration.verdict import Verdict
     from processing.runs.overwriting import require_free
-    from processing.runs.run_check import checked_by_run, run_beside
     from server.pictures.calibration_pictures import picture_paths
 
     figure = picture_beside(options.out)
     require_free(options.out, figure, *picture_paths(options.out), overwrite=options.overwrite)
-    calibration_set = load_calibration_set(
-        options.set, dict(options.origin or ()), dict(options.roll or ()), options.mirrored or (), tracked
-    )
-    calibration = calibrate(calibration_set, model=options.model, counted=tracked)
-    run_dir = options.run or run_beside(options.set)
-    if run_dir is not None:
-        calibration = checked_by_run(calibration, run_dir)
+    calibration_set, calibration = _fitted(options)
     figures = [str(picture) for picture in _written(options, calibration_set, calibration, figure)]
     _tell(calibration)
     result = {
@@ -104,6 +95,20 @@ def calibrate_views(options: Namespace) -> Outcome:
     }
     drawn_in = ", ".join([str(figure), *figures])
     return Outcome(result, f"{views_table(calibration)}\n{calibration.id}: {options.out}, pictures in {drawn_in}")
+
+
+def _fitted(options: Namespace) -> "tuple[CalibrationSet, Calibration]":
+    """The set, and the calibration of it, with what the droplets of its run say."""
+    from processing.calibration.calibrate import calibrate
+    from processing.calibration.sets.calibration_set import load_calibration_set
+    from processing.runs.run_check import checked_by_run, run_beside
+
+    calibration_set = load_calibration_set(
+        options.set, dict(options.origin or ()), dict(options.roll or ()), options.mirrored or (), tracked
+    )
+    calibration = calibrate(calibration_set, model=options.model, counted=tracked)
+    run_dir = options.run or run_beside(options.set)
+    return calibration_set, calibration if run_dir is None else checked_by_run(calibration, run_dir)
 
 
 def _written(
@@ -171,6 +176,9 @@ def view_errors(calibration: "Calibration") -> dict[str, Any]:
     return {"views": {name: _errors(view, middle_mm) for name, view in calibration.views.items()}}
 
 
+_OF_A_PLANE = ("name", "z_mm", "mean_error_px", "rms_px", "max_error_px", "holdout_error_px")
+
+
 def _errors(view: "ViewCalibration", middle_mm: "FloatArray | None") -> dict[str, Any]:
     from processing.calibration.fit.covariance import worst_position_std_px
 
@@ -185,17 +193,7 @@ def _errors(view: "ViewCalibration", middle_mm: "FloatArray | None") -> dict[str
         "rays_miss_px": view.rays_miss_px,
         "candidates_holdout_error_px": dict(view.candidates_holdout_error_px),
         "position_std_px": worst_position_std_px(view),
-        "planes": [
-            {
-                "name": plane.name,
-                "z_mm": plane.z_mm,
-                "mean_error_px": plane.mean_error_px,
-                "rms_px": plane.rms_px,
-                "max_error_px": plane.max_error_px,
-                "holdout_error_px": plane.holdout_error_px,
-            }
-            for plane in view.planes
-        ],
+        "planes": [{name: getattr(plane, name) for name in _OF_A_PLANE} for plane in view.planes],
         "worst_plane": view.worst_plane.name,
         "placement": _placement(view, middle_mm),
         "verdict": view.verdict.value,

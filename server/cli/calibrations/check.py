@@ -10,6 +10,10 @@ from server.cli.options import Verbs, add_calibrated_run, add_shots, add_verb
 from server.cli.output import Outcome, progress, table, tracked
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from processing.calibration.calibration import Calibration
+    from processing.calibration.verdict import Verdict
     from processing.runs.shots.shot_check import ShotCheck
 
 _MEANING = {"warn": "ALARM", "refuse": "STOP: do not reconstruct with this calibration"}
@@ -29,40 +33,54 @@ def check(options: Namespace) -> Outcome:
     from processing.analysis.near_or_far import added, doubts_of
     from processing.calibration.calibration_file import load_calibration
     from processing.calibration.verdict import Verdict
-    from processing.interlaced import ALTERNATING
-    from processing.runs.run_check import check_shot, odd_images
     from processing.runs.shots.shot_check import ALARM_PX, STOP_PX
     from processing.runs.unchecked_images import told_unchecked, unknown_crop
-    from processing.runs.workbench import Workbench
 
-    calibration, workbench = load_calibration(options.calibration), Workbench()
-    shots, odd = [], []
-    for index in tracked(selected_shots(options.run, options.shots)):
-        measured = check_shot(options.run, index, calibration, workbench)
-        progress(f"{options.run.name}: {check_line(measured)}")
-        shots.append(measured)
-        odd.append(odd_images(options.run, index, workbench))
-        for what in odd[-1]:
-            progress(f"{options.run.name}: shot {index}, {what}")
+    calibration = load_calibration(options.calibration)
+    shots, odd = _shot_by_shot(options, calibration)
     with RunReader(options.run) as run:
         unchecked = told_unchecked(unknown_crop(run.header), progress)
     for doubt in (depth := doubts_of(added(shot.sights for shot in shots))):
         progress(f"{options.run.name}: {doubt}")
-    woven = any(what.endswith(ALTERNATING) for told in odd for what in told)
-    verdicts = [shot.verdict for shot in shots if shot.verdict is not None]
-    verdicts += [Verdict.WARN] * woven + [Verdict.REFUSE] * bool(depth)
+    verdict = _verdict(shots, odd, depth)
     result = {
-        "passed": Verdict.REFUSE not in verdicts,
+        "passed": verdict is not Verdict.REFUSE,
         "run": options.run.name,
         "calibration": calibration.id,
         "alarm_px": ALARM_PX,
         "stop_px": STOP_PX,
-        "verdict": max(verdicts, key=list(Verdict).index) if verdicts else None,
+        "verdict": verdict,
         "shots": [{**shot.record(), "odd_light": list(what)} for shot, what in zip(shots, odd, strict=True)],
         "depth": list(depth),
         "not_checked": unchecked,
     }
     return Outcome(result, views_table(result))
+
+
+def _shot_by_shot(options: Namespace, calibration: "Calibration") -> "tuple[list[ShotCheck], list[tuple[str, ...]]]":
+    """What droplets say of each shot, and what is odd with its images; both are told as they come."""
+    from processing.runs.run_check import check_shot, odd_images
+    from processing.runs.workbench import Workbench
+
+    workbench, shots, odd = Workbench(), [], []
+    for index in tracked(selected_shots(options.run, options.shots)):
+        shots.append(check_shot(options.run, index, calibration, workbench))
+        progress(f"{options.run.name}: {check_line(shots[-1])}")
+        odd.append(odd_images(options.run, index, workbench))
+        for what in odd[-1]:
+            progress(f"{options.run.name}: shot {index}, {what}")
+    return shots, odd
+
+
+def _verdict(shots: "Sequence[ShotCheck]", odd: "Sequence[Sequence[str]]", depth: "Sequence[str]") -> "Verdict | None":
+    """The worst of all shots, of images of alternating rows, and of a depth that counts the other way."""
+    from processing.calibration.verdict import Verdict
+    from processing.interlaced import ALTERNATING
+
+    woven = any(what.endswith(ALTERNATING) for told in odd for what in told)
+    verdicts = [shot.verdict for shot in shots if shot.verdict is not None]
+    verdicts += [Verdict.WARN] * woven + [Verdict.REFUSE] * bool(depth)
+    return max(verdicts, key=list(Verdict).index, default=None)
 
 
 def check_line(measured: "ShotCheck") -> str:
