@@ -11,7 +11,7 @@ from daq.drivers.pulse_protocol import Command, ErrorNumber, Fault, Source, Stat
 from daq.simulation.pico.firmware_build import ImageKind
 from daq.simulation.pico.rp2040_chip import PIN_LIGHT
 from daq.simulation.pico.rp2040_emulator import CYCLES_PER_MS, EmulatedPico
-from tests.support.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board, image
+from tests.support.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board, image, state_and_faults
 
 LIT_AT_MOST_MS = 1.0
 """For which the tables permit 25 to 40 A."""
@@ -39,11 +39,6 @@ def board() -> Iterator[Board]:
     board.pico.edges.clear()
     yield board
     assert not any(board.pico.levels().values())
-
-
-def state_and_faults(board: Board) -> tuple[State, Fault]:
-    status = board.ask(Command.STATUS)
-    return State(status.number("state")), Fault(status.number("faults"))
 
 
 def longest_light_ms(board: Board) -> float:

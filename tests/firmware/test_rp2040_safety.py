@@ -20,7 +20,7 @@ from daq.drivers.pulse_protocol import (
 )
 from daq.simulation.pico.rp2040_chip import PIN_CAMERA, PIN_ESTOP, PIN_INTERLOCK, PIN_LIGHT, PIN_TRIGGER
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS
-from tests.support.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
+from tests.support.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board, state_and_faults
 
 WATCHDOG_MS = 200
 DARK_WITHIN_NS = 450
@@ -76,11 +76,6 @@ def lit_after(board: Board, cycle: int) -> list[int]:
 def dark_at(board: Board) -> int:
     """Cycle of the last falling edge of a light."""
     return max(edge.cycle for edge in board.pico.edges if edge.output.startswith("light") and not edge.high)
-
-
-def state_and_faults(board: Board) -> tuple[State, Fault]:
-    status = board.ask(Command.STATUS)
-    return State(status.number("state")), Fault(status.number("faults"))
 
 
 @pytest.mark.parametrize("into_pulse_cycles", [1, 30, 90, 150])

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from processing.kernels import _native
 from processing.preprocessing import Preprocessing, intensity, sliding_minimum
 from tests.support import preprocessing_oracle as oracle
 
@@ -94,12 +93,6 @@ def test_references_of_another_size_are_refused() -> None:
 def test_frames_of_another_type_are_refused() -> None:
     with pytest.raises(ValueError, match="uint8 or uint16, not float64"):
         intensity(np.ones((3, 3)), Preprocessing(), bits=BITS)  # type: ignore[arg-type]
-
-
-@pytest.fixture(params=_native.available_isas())
-def isa(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.setenv("TOMOSHADOW_ISA", request.param)
-    return str(request.param)
 
 
 def random_exposure(

@@ -8,7 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from daq.drivers.pulse_protocol import MAX_SEQUENCE, Command, Reply, Request, Source, decode_reply, encode_request
+from daq.drivers.pulse_protocol import (
+    MAX_SEQUENCE,
+    Command,
+    Fault,
+    Reply,
+    Request,
+    Source,
+    State,
+    decode_reply,
+    encode_request,
+)
 from daq.simulation.pico.edge import Edge
 from daq.simulation.pico.firmware_build import ImageKind, build_image
 from daq.simulation.pico.rp2040_chip import TRIGGER
@@ -170,3 +180,9 @@ class Board:
                 self.pico.at(edge.cycle + after_cycles, action)
 
         self.pico.on_edge = watch
+
+
+def state_and_faults(board: Board) -> tuple[State, Fault]:
+    """What a board says of itself."""
+    status = board.ask(Command.STATUS)
+    return State(status.number("state")), Fault(status.number("faults"))

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -17,6 +16,7 @@ from playwright.sync_api import Browser
 
 from tests.support.desk import opened_tab
 from tests.support.operator import VIEWS, drive_the_page
+from tests.support.server_process import free_port
 
 pytestmark = [pytest.mark.network, pytest.mark.timeout(900)]
 
@@ -25,12 +25,6 @@ CONFIG = ROOT / "configs" / "simulated_small.toml"
 CURRENT_A = {"view1": 25.0, "view2": 9.9, "view3": 10.0, "view4": 26.0}
 DEADLINE_S = 180.0
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
-
-
-def free_port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return int(free.getsockname()[1])
 
 
 def command(port: int) -> list[str]:

@@ -40,13 +40,7 @@ def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, Vie
     if turned_deg and (len(turned_deg) < len(mappings) or len(set(turned_deg.values())) > 1):
         raise CalibrationError("; ".join(_some_turned(calibration_set, mappings, middle_mm, turned_deg)))
     if turned_deg:
-        turn_deg = next(iter(turned_deg.values()))
-        yield Doubt(
-            tuple(turned_deg),
-            f"every view sees the target's axes turned by {turn_deg} deg about z: so do x and y of all results, unless "
-            "azimuths count the other way, or all images are mirrored"
-            + (f"; {upright}" if (upright := _upright(calibration_set, turned_deg)) else ""),
-        )
+        yield _all_turned(calibration_set, turned_deg)
     doubtful_deg = doubtful_views(mappings, middle_mm, azimuths_deg)
     yield from _doubtful(calibration_set, mappings, middle_mm, doubtful_deg)
     in_line = {name: angle for name, angle in azimuths_deg.items() if not turned_deg and name not in doubtful_deg}
@@ -57,12 +51,25 @@ def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, Vie
             "target than the other views agree on: do x and z count the other way there, or is its azimuth half a turn "
             "off?",
         )
-    for one, other in in_one_place(mappings, middle_mm):
-        yield Doubt(
-            (one, other),
-            f"{one} and {other} seem to stand in one place: if one of them hangs upside down (roll_deg) or looks by a "
-            "mirror (mirrored), say so, else their lines of sight do not meet",
-        )
+    for pair in in_one_place(mappings, middle_mm):
+        yield _together(*pair)
+
+
+def _all_turned(calibration_set: CalibrationSet, turned_deg: Mapping[str, int]) -> Doubt:
+    turn_deg, upright = next(iter(turned_deg.values())), _upright(calibration_set, turned_deg)
+    text = (
+        f"every view sees the target's axes turned by {turn_deg} deg about z: so do x and y of all results, unless "
+        "azimuths count the other way, or all images are mirrored"
+    )
+    return Doubt(tuple(turned_deg), f"{text}; {upright}" if upright else text)
+
+
+def _together(one: str, other: str) -> Doubt:
+    return Doubt(
+        (one, other),
+        f"{one} and {other} seem to stand in one place: if one of them hangs upside down (roll_deg) or looks by a "
+        "mirror (mirrored), say so, else their lines of sight do not meet",
+    )
 
 
 def _some_turned(

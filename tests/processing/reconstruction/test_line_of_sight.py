@@ -25,12 +25,6 @@ GRID = VoxelGrid.centred((21, 37, 275), 1 / 60)
 """Longer than a tile, not a multiple of anything."""
 
 
-@pytest.fixture(params=_native.available_isas())
-def isa(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.setenv("TOMOSHADOW_ISA", request.param)
-    return str(request.param)
-
-
 def random_images(mappings: list[ViewMapping], blur_px: float = 0.0, seed: int = 1) -> list[NDArray[np.float32]]:
     rng = np.random.default_rng(seed)
     images = [rng.random(mapping.image_size_px[::-1]).astype(np.float32) for mapping in mappings]

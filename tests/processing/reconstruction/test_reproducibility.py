@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from processing.kernels import _native
 from processing.reconstruction.choices import Accuracy, ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight, slabs_of_sight
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
@@ -24,12 +23,6 @@ GRID = VoxelGrid.centred((9, 75, 101), PITCH_MM)
 """Five slabs of sixteen rows and ten of eight: threads of any number get unequal shares."""
 MAPPINGS = oracle.cameras(3, roll_deg=3.0)
 Arrays = Iterable[NDArray[Any]]
-
-
-@pytest.fixture(params=_native.available_isas())
-def isa(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.setenv("TOMOSHADOW_ISA", request.param)
-    return str(request.param)
 
 
 @pytest.fixture(params=[0, 1, 3], ids="{} by nodes".format)

@@ -15,12 +15,6 @@ STATED_PX = 0.016
 """What plans add to their deviation for it."""
 
 
-@pytest.fixture(params=_native.available_isas())
-def isa(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.setenv("TOMOSHADOW_ISA", request.param)
-    return str(request.param)
-
-
 def resampled(image: NDArray[np.float32], start_px: float) -> Array:
     """The image along u, from a column on in steps of ``STEP_PX``; rows as they are."""
     rows = image.shape[0]

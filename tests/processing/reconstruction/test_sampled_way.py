@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from processing.geometry import PinholeCamera, ViewMapping, view_camera
-from processing.kernels import _native
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.planning.node_view import NodeView, sample_mapping
@@ -19,12 +18,6 @@ METHODS = [ReconstructionMethod.GAVLOS, ReconstructionMethod.MINLOS, Reconstruct
 GRID = VoxelGrid.centred((11, 21, 75), PITCH_MM)
 WAVELENGTH_MM = {16: 6.0, 8: 3.0, 4: 1.5, 2: 0.75}
 """By node spacing: a wave of one pixel bends by 0.35 px mm^2 (spacing / 16 / wavelength)^2 between nodes: 0.01 px."""
-
-
-@pytest.fixture(params=_native.available_isas())
-def isa(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.setenv("TOMOSHADOW_ISA", request.param)
-    return str(request.param)
 
 
 def cameras(count: int, roll_deg: float) -> list[PinholeCamera]:

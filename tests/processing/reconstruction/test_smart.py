@@ -22,12 +22,6 @@ SMART_FROM_START, SMART_FROM_MLOS, MART = (1.5e-3, 1e-2), (3e-3, 2e-2), (1.5e-2,
 """What ``smart`` and ``mart`` state after three iterations: of the norm of the volume, and of its brightest voxel."""
 
 
-@pytest.fixture(params=_native.available_isas())
-def isa(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.setenv("TOMOSHADOW_ISA", request.param)
-    return str(request.param)
-
-
 def make_plan(mappings: list[ViewMapping], by_nodes: bool, grid: VoxelGrid = GRID) -> Plan:
     if by_nodes:
         return Plan(grid, tuple(sample_mapping(mapping, grid, 0.02) for mapping in mappings))

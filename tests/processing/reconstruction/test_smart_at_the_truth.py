@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from processing.kernels import _native
 from processing.reconstruction.planning.node_view import sample_mapping
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.reconstruction.planning.rectified_view import MAP_SPACING_PX, RectifiedView
@@ -21,12 +20,6 @@ GRID = VoxelGrid.centred((17, 43, 96), 1 / 60)
 FRAME = (slice(1, -2), slice(1, -2))
 """Of zeros, around the image of a view by nodes."""
 Volume = NDArray[np.float32]
-
-
-@pytest.fixture(params=_native.available_isas())
-def isa(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.setenv("TOMOSHADOW_ISA", request.param)
-    return str(request.param)
 
 
 def as_it_is(view: RectifiedView) -> RectifiedView:

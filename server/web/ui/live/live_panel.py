@@ -44,27 +44,30 @@ class LivePanel:
         self._acquisition = context.services.acquisition
         self._draft = draft
         with panel("Live"):
-            with ui.row().classes("w-full gap-2 items-center"):
-                self._start = ui.button("Live", icon="videocam").props("outline dense no-caps")
-                self._start.on("click", self._on_start, js_handler=TICKET)
-                self._end = ui.button("End live", icon="videocam_off", on_click=self._on_end)
-                self._end.props("outline dense no-caps")
-                self._rate = ui.number(
-                    "Live / Hz",
-                    value=_FIELDS["rate_hz"].default,
-                    validation=lambda value: problem_of(_FIELDS, "rate_hz", value),
-                )
-                self._rate.props("dense outlined hide-bottom-space").classes("w-24")
-                self._lit = ui.switch("Pulsed light", value=True)
-                self._lit.tooltip("Pulses and currents of the form of a new run; off: no light but that of the room")
-                self._shoot = ui.button("Shoot one", icon="photo_camera")
-                self._shoot.on("click", self._on_shoot, js_handler=TICKET)
-                self._shoot.props("outline dense no-caps")
-                self._shoot.tooltip("One shot with the light of the form of a new run; the next one takes its place")
-                self._keep = ui.button("Keep shot", icon="save", on_click=self._on_keep).props("outline dense no-caps")
+            self._add_controls()
             self._refusal = Refusal(self._basis, "live refusal")
             LiveTiles(context.services.rig.cameras, _HINT, full=True)
         self.refresh()
+
+    def _add_controls(self) -> None:
+        with ui.row().classes("w-full gap-2 items-center"):
+            self._start = ui.button("Live", icon="videocam").props("outline dense no-caps")
+            self._start.on("click", self._on_start, js_handler=TICKET)
+            self._end = ui.button("End live", icon="videocam_off", on_click=self._on_end)
+            self._end.props("outline dense no-caps")
+            self._rate = ui.number(
+                "Live / Hz",
+                value=_FIELDS["rate_hz"].default,
+                validation=lambda value: problem_of(_FIELDS, "rate_hz", value),
+            )
+            self._rate.props("dense outlined hide-bottom-space").classes("w-24")
+            self._lit = ui.switch("Pulsed light", value=True)
+            self._lit.tooltip("Pulses and currents of the form of a new run; off: no light but that of the room")
+            self._shoot = ui.button("Shoot one", icon="photo_camera")
+            self._shoot.on("click", self._on_shoot, js_handler=TICKET)
+            self._shoot.props("outline dense no-caps")
+            self._shoot.tooltip("One shot with the light of the form of a new run; the next one takes its place")
+            self._keep = ui.button("Keep shot", icon="save", on_click=self._on_keep).props("outline dense no-caps")
 
     def refresh(self) -> None:
         """Follow the state of acquisition."""
