@@ -27,7 +27,7 @@ from processing.runs.seen_views import seen_views
 from processing.runs.shots.agreeing_shots import corrected_by
 from processing.runs.shots.shot_check import Exposure, ShotCheck, check_shots
 from processing.runs.shots.shot_images import shot_intensities
-from processing.runs.shots.stated_lengths import other_scale
+from processing.runs.shots.stated_lengths import untold_doubt
 from processing.runs.workbench import Workbench
 
 CHECKED_SHOTS = 3
@@ -154,8 +154,8 @@ def _checked(
     """What droplets say of the views, and the rig of the run of all lengths."""
     checks = check_shots(_droplets(run_dir, shots, calibration, workbench=workbench), calibration)
     with RunReader(run_dir) as run:
-        lengths = other_scale(run.header, calibration)
-    return [replace(check, lengths=lengths) for check in checks]
+        untold = untold_doubt(run.header, calibration)
+    return [replace(check, untold=untold) for check in checks]
 
 
 def _droplets(

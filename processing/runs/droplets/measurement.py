@@ -48,7 +48,7 @@ from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results, provenance_of
 from processing.runs.shots.separation import separation_of
 from processing.runs.shots.shot_images import frame_names, require_match
-from processing.runs.shots.stated_lengths import other_scale
+from processing.runs.shots.stated_lengths import untold_doubt
 from processing.runs.shots.turned_views import sights_in
 from processing.runs.sprays.conditions import conditions_of
 from processing.runs.workbench import References, read_references
@@ -212,7 +212,7 @@ class RunMeasurement:
         measure = self._bright if self.settings.polarity == "bright" else self._shadows
         exposure, lights, reasons = measure(shot, frame, threads, before_round)
         sights = sights_in(self.calibration, list(shot.views), lights) if frame != "b" else {}
-        doubts = (depth_reversed(sights), other_scale(self.run.header, self.calibration))
+        doubts = (depth_reversed(sights), untold_doubt(self.run.header, self.calibration))
         return doubted(exposure, (*reasons, *filter(None, doubts))), sights
 
     def _bright(self, shot: Shot, frame: FrameName, threads: int, before_round: Callable[[], None]) -> _Found:

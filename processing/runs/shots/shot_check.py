@@ -49,8 +49,8 @@ class ShotCheck:
         Some views agree. Where none do, none is known to be wrong: the spots of noisy images are no droplets.
     sights : dict of str to int
         At how many droplets of all shots that were asked at once lines of sight meet, by what is assumed.
-    lengths : str
-        Why all lengths may be those of another lens, which no droplet tells.
+    untold : str
+        What speaks against the calibration that no droplet tells.
     """
 
     shot: int
@@ -59,7 +59,7 @@ class ShotCheck:
     beyond: tuple[str, ...] = ()
     agreed: bool = True
     sights: Mapping[str, int] = field(default_factory=dict)
-    lengths: str = ""
+    untold: str = ""
 
     @property
     def worst_px(self) -> float:
@@ -87,12 +87,12 @@ class ShotCheck:
         """By the limits of a hold-out error: ``warn`` is an alarm, ``refuse`` stops reconstruction.
 
         A view that has moved further than can be measured is refused too; where no views agree, that is an alarm, and
-        so are lengths in another scale.
+        so is what no droplet tells.
         """
         if self.beyond:
             return Verdict.REFUSE if self.agreed else Verdict.WARN
         told = judge(self.certain_px) if self.views else None
-        return Verdict.WARN if self.lengths and told is not Verdict.REFUSE else told
+        return Verdict.WARN if self.untold and told is not Verdict.REFUSE else told
 
     def record(self) -> dict[str, Any]:
         """What was found, for a program: JSON values."""
@@ -102,7 +102,7 @@ class ShotCheck:
             "moved": self.moved,
             "views": {name: view.disparity_px for name, view in self.views.items()},
             "uncertainty_px": {name: view.uncertainty_px for name, view in self.views.items()},
-            "problem": "; ".join(filter(None, (self.problem, self.lengths))) or None,
+            "problem": "; ".join(filter(None, (self.problem, self.untold))) or None,
         }
 
     @property

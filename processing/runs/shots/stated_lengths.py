@@ -1,14 +1,16 @@
-"""Is a calibration in the scale of the images? A factor of all lengths moves no view, and no droplet tells it."""
+"""What speaks against a calibration that no droplet tells: lengths of another lens, and what it says against itself."""
 
 from daq.files.header import RunHeader
 from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.disparity import measured_box
+from processing.calibration.fit.health import judge
 from processing.calibration.fit.scale_check import SCALE_TOLERANCE, scale_px_per_mm
 from processing.calibration.sets.recorded_set import nominal_scales
+from processing.calibration.verdict import Verdict
 
 
-def other_scale(header: RunHeader, calibration: Calibration) -> str:
-    """Why lengths may be those of another lens; empty where they are not, or the run does not say its magnification.
+def untold_doubt(header: RunHeader, calibration: Calibration) -> str:
+    """Why places and lengths may be wrong although droplets agree; empty where nothing says so.
 
     Parameters
     ----------
@@ -17,6 +19,22 @@ def other_scale(header: RunHeader, calibration: Calibration) -> str:
     calibration : Calibration
         By which its droplets are placed.
     """
+    return other_scale(header, calibration) or own_doubt(header, calibration)
+
+
+def own_doubt(header: RunHeader, calibration: Calibration) -> str:
+    """What a calibration says against a view of a run beside its hold-out error, which droplets tell anew."""
+    for name in header.views:
+        view = calibration.views.get(name)
+        if view is None or view.verdict is not Verdict.WARN:
+            continue
+        if judge(view.holdout_error_px, view.n_rejected / max(1, view.n_rejected + view.n_points)) is not Verdict.WARN:
+            return f"calibration {calibration.id} says so itself, {name}: warn: {view.reasons[-1]}"
+    return ""
+
+
+def other_scale(header: RunHeader, calibration: Calibration) -> str:
+    """Why lengths may be those of another lens; empty where they are not, or the run does not say its magnification."""
     middle_mm = measured_box(calibration).middle_mm
     for view, stated in nominal_scales(header.configuration).items():
         if view not in calibration.views:

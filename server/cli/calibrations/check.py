@@ -86,7 +86,7 @@ def _verdict(shots: "Sequence[ShotCheck]", odd: "Sequence[Sequence[str]]", depth
 def check_line(measured: "ShotCheck") -> str:
     """One shot for a person."""
     meaning = _MEANING.get(measured.verdict) if measured.verdict else None
-    told = "; ".join(filter(None, (_finding(measured), measured.lengths)))
+    told = "; ".join(filter(None, (_finding(measured), measured.untold)))
     return f"shot {measured.shot}: {told}" + (f"  {meaning}" if meaning else "")
 
 

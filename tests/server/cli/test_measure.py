@@ -11,7 +11,9 @@ import pytest
 from daq.files.run_directory import DoubleFrame, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.analysis.droplets.droplet_file import read_droplets
 from processing.analysis.droplets.ghost_share import matches
-from processing.calibration.calibration_file import save_calibration
+from processing.calibration.calibration_file import load_calibration, save_calibration
+from processing.calibration.calibration_record import content_id
+from processing.calibration.verdict import Doubt
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import GridSettings
 from server.cli.main import main
@@ -308,6 +310,20 @@ def test_droplets_in_another_scale_than_that_of_the_rig_are_doubtful(
     assert shot["verdict"] == "doubtful"
     assert not any("same lenses" in one["what"] for one in result["not_checked"])
     assert "29.7 px/mm by magnification and pixels of the rig: is the calibration that of another" in shot["reasons"][0]
+
+
+def test_droplets_placed_by_a_calibration_that_doubts_itself_are_doubtful(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A target in another unit than was stated: all views agree, and all lengths are wrong."""
+    write_bright_run(tmp_path / "run")
+    write_bright_calibration(tmp_path / "sure.json")
+    calibration = load_calibration(tmp_path / "sure.json")
+    doubted = calibration.doubted([Doubt(tuple(calibration.views), "is pitch_mm right?")])
+    save_calibration(doubted.with_id(content_id(doubted)), tmp_path / "calibration.json")
+    (shot,) = told(capsys, *command(tmp_path, tmp_path / "out"))["shots"]
+    assert shot["verdict"] == "doubtful"
+    assert shot["reasons"][0].endswith("says so itself, view1: warn: is pitch_mm right?")
 
 
 def test_few_droplets_do_not_tell_near_from_far_and_that_is_said(

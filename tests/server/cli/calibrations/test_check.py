@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from processing.calibration.calibration_file import load_calibration, save_calibration
+from processing.calibration.calibration_record import content_id
 from processing.calibration.droplets.disparity import ViewDisparity
 from processing.calibration.fit.not_checked import DROPLETS
-from processing.calibration.verdict import Verdict
+from processing.calibration.verdict import Doubt, Verdict
 from processing.runs.run_check import checked_by_run
 from processing.runs.shots.shot_check import ShotCheck
 from server.cli.calibrations.check import check_line, views_table
@@ -48,6 +49,21 @@ def test_a_calibration_in_another_scale_than_the_rig_is_an_alarm(
     (shot,) = result["shots"]
     assert max(shot["views"].values()) < 0.2
     assert ("is the calibration that of another lens" in str(shot["problem"])) == (verdict == "warn")
+
+
+@pytest.mark.parametrize("command", ["check", "reconstruct"])
+def test_what_a_calibration_says_against_itself_is_told_where_it_is_used(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its droplets agree: no droplet tells a wrong pitch of the target."""
+    calibration = calibration_of(views()).doubted([Doubt(("view2",), "is pitch_mm right?")])
+    save_calibration(calibration.with_id(content_id(calibration)), tmp_path / "doubted.json")
+    run_dir = write_droplet_run(tmp_path / "run", drift_px=0, shots=1)
+    made = [] if command == "check" else [GRID, "-o", tmp_path / "out"]
+    result = told(capsys, command, run_dir, "--calibration", tmp_path / "doubted.json", *made)
+    answer = result if command == "check" else result["belonging"]
+    assert answer["verdict"] == "warn"
+    assert answer["shots"][0]["problem"].endswith("says so itself, view2: warn: is pitch_mm right?")
 
 
 def test_moved_view_stops_and_a_corrected_calibration_is_good_again(
