@@ -64,9 +64,10 @@ def _views(spray: MeasuredSpray) -> str:
 
 def _separations(spray: MeasuredSpray) -> str:
     """Once where all shots have the same."""
-    told: list[Mapping[str, Any] | None] = [json.loads(one) for one in _stated(spray, "velocity")]
+    told: list[Mapping[str, Any]] = [json.loads(one) or {} for one in _stated(spray, "velocity")]
+    known = [one for one in told if "separation_ns" in one]
     return " and ".join(
-        dict.fromkeys(f"{one['separation_ns'] / 1000:.5g}, as {one['separation_source']}" for one in told if one)
+        dict.fromkeys(f"{one['separation_ns'] / 1000:.5g}, as {one['separation_source']}" for one in known)
     )
 
 

@@ -214,7 +214,7 @@ def _made_by(provenance: Mapping[str, Any]) -> dict[str, object]:
 
 def _stated(shots: Sequence[StoredDroplets]) -> dict[str, object]:
     """What people say of a spray, and how far apart its exposures are."""
-    velocities = [json.loads(str(shot.provenance.get("velocity", "{}"))) for shot in shots]
+    velocities = [json.loads(str(shot.provenance.get("velocity", "{}"))) or {} for shot in shots]
     known = [(one["separation_ns"] / 1000, one["separation_source"]) for one in velocities if "separation_ns" in one]
     apart = dict.fromkeys(f"{us:.4g} us as {source}" for us, source in known)
     return {**noted(shots), **({"separation": " and ".join(apart)} if apart else {})}

@@ -29,6 +29,6 @@ def test_views_voxel_and_separation_are_told_each_once() -> None:
 
 
 def test_what_is_not_known_has_no_row() -> None:
-    found = rows({}, {"velocity": "null"})
+    found = rows({}, {"velocity": "null"}, {"velocity": json.dumps({"reason": "shots have one exposure"})})
     assert not {"from A to B [µs]", "views", "box [mm]"} & set(found)
     assert found["nozzle and axis"] == "not known"
