@@ -14,6 +14,8 @@ from processing.grey_image import require_image
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, Polarity
 from processing.reconstruction.planning.calibrated_plan import telling_where
+from processing.runs.droplets.measured_shot import doubted
+from processing.runs.shots.stated_lengths import own_doubt
 from processing.volume import VoxelGrid
 
 
@@ -84,9 +86,11 @@ def measure(
     mappings = [calibration.views[name].mapping for name in names]
     with telling_where(calibration, grid):
         search = plan_droplets(mappings, grid, names, margin_voxel=margin_voxel)
+    seen, doubts = list(images.values()), tuple(filter(None, [own_doubt(calibration, names)]))
     if polarity == "shadow":
-        return measure_shadows(list(images.values()), search, light=light, twins=twins, seed=seed, threads=threads)
-    return measure_bright(list(images.values()), search, twins=twins, seed=seed, threads=threads)
+        shadows = measure_shadows(seen, search, light=light, twins=twins, seed=seed, threads=threads)
+        return doubted(shadows, doubts)
+    return doubted(measure_bright(seen, search, twins=twins, seed=seed, threads=threads), doubts)
 
 
 def _require_options(polarity: Polarity, light: Light) -> None:

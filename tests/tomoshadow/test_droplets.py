@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tomoshadow as ts
+from processing.calibration.verdict import Doubt
 from processing.studies.velocity.double_scenes import SEPARATION_NS
 from tests.support.bright_scenes import GRID, MARGIN_VOXEL, moving_scene, scene, write_bright_calibration
 
@@ -23,6 +24,14 @@ def test_droplets_of_named_images_are_measured_in_any_order(tmp_path: Path) -> N
     assert len(first.droplets) == pytest.approx(len(truth.heights), abs=2)
     assert len(second.droplets) == pytest.approx(len(first.droplets), abs=1)
     assert {len(column) for column in first.droplets.columns().values()} == {len(first.droplets)}
+
+
+def test_what_a_calibration_says_against_itself_makes_droplets_doubtful(tmp_path: Path) -> None:
+    calibration, truth = ts.load_calibration(write_bright_calibration(tmp_path / "calibration.json")), scene()
+    doubted = calibration.doubted([Doubt(tuple(calibration.views), "is pitch_mm right?")])
+    images = dict(zip(calibration.views, truth.images, strict=True))
+    found = ts.measure(doubted, images, GRID, margin_voxel=MARGIN_VOXEL)
+    assert (found.verdict, [reason.endswith("is pitch_mm right?") for reason in found.reasons]) == ("doubtful", [True])
 
 
 def test_two_exposures_give_velocities(tmp_path: Path) -> None:

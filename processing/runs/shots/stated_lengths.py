@@ -1,5 +1,7 @@
 """What speaks against a calibration that no droplet tells: lengths of another lens, and what it says against itself."""
 
+from collections.abc import Iterable
+
 from daq.files.header import RunHeader
 from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.disparity import measured_box
@@ -19,12 +21,12 @@ def untold_doubt(header: RunHeader, calibration: Calibration) -> str:
     calibration : Calibration
         By which its droplets are placed.
     """
-    return other_scale(header, calibration) or own_doubt(header, calibration)
+    return other_scale(header, calibration) or own_doubt(calibration, header.views)
 
 
-def own_doubt(header: RunHeader, calibration: Calibration) -> str:
-    """What a calibration says against a view of a run beside its hold-out error, which droplets tell anew."""
-    for name in header.views:
+def own_doubt(calibration: Calibration, names: Iterable[str]) -> str:
+    """What a calibration says against one of these views beside its hold-out error, which droplets tell anew."""
+    for name in names:
         view = calibration.views.get(name)
         if view is None or view.verdict is not Verdict.WARN:
             continue
