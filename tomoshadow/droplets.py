@@ -50,7 +50,7 @@ def measure(
         are not.
     twins : int
         Simulated twins of the exposure in which ghosts are counted, a witness; each costs as much as the exposure
-        itself. Where views are not four there is one at least.
+        itself. Where views are not four, and apart, there is one at least.
     seed : int
         Of the twins.
     margin_voxel : int

@@ -76,7 +76,7 @@ def measure_bright(
         Where to look.
     twins : int
         Simulated twins of the exposure in which ghosts are counted: each costs as much as the exposure itself. Where
-        views are not four there is one at least.
+        views are not four, and apart, there is one at least.
     seed : int
         Of the twins.
     threads : int
@@ -102,7 +102,7 @@ def measure_bright(
     residuals = shot.residuals(fit.optics, fit.blobs)
     left = np.array([noise_of(residual) for residual in residuals])
     told = _told(shot, fit, search, residuals, left, noises)
-    count = twins_of(twins, len(images))
+    count = twins_of(twins, len(images), search.lattice.directions)
     if not count or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)
@@ -175,6 +175,7 @@ def _droplets(
         residual=residual,
         crowding=crowding(search.lattice.seen_px(blobs.positions_voxel), np.full(len(blobs), 2 * width_px**2)),
         width_px=width_px,
+        directions=search.lattice.directions,
     )
     return Droplets(
         points_mm=search.searched.to_mm(blobs.positions_voxel[:, ::-1]),

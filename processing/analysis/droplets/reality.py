@@ -15,7 +15,7 @@ from scipy.special import expit
 from processing.geometry import FloatArray
 
 TRIED_VIEWS = 4
-"""So many views shots had, and knew each of the droplets."""
+"""So many views shots had, along lines that are apart, and knew each of the droplets."""
 CROWD_PX = 20.0
 """So far around a droplet others crowd it."""
 LEAST_CROWDING, LEAST_RESIDUAL = 0.01, 0.5
@@ -40,6 +40,8 @@ class Evidence:
         As ``crowding`` has it.
     width_px : float
         Standard deviation of the blur, or of a spot.
+    directions : int
+        Along so many lines the views look.
     """
 
     together: FloatArray
@@ -48,6 +50,7 @@ class Evidence:
     residual: FloatArray
     crowding: FloatArray
     width_px: float
+    directions: int
 
     @property
     def columns(self) -> FloatArray:
@@ -105,14 +108,15 @@ class Reality:
         """
         least_px, most_px = self.widths_px
         tried = (knowing == TRIED_VIEWS) & (evidence.crowding <= self.most_crowding)
-        if len(evidence.alone) != TRIED_VIEWS or not least_px <= evidence.width_px <= most_px:
+        views_tried = len(evidence.alone) == evidence.directions == TRIED_VIEWS
+        if not views_tried or not least_px <= evidence.width_px <= most_px:
             return np.full(len(tried), np.nan)
         return np.where(tried, expit(self.base + evidence.columns @ np.array(self.weights)), np.nan)
 
 
-def twins_of(asked: int, views: int) -> int:
-    """How many twins to make: one at least where views are not four, as then no probability tells of ghosts."""
-    return asked or int(views != TRIED_VIEWS)
+def twins_of(asked: int, views: int, directions: int) -> int:
+    """How many twins to make: one at least where views are not four, and apart, as then no probability tells ghosts."""
+    return asked or int(not views == directions == TRIED_VIEWS)
 
 
 def crowding(seen_px: FloatArray, areas_px2: FloatArray) -> FloatArray:

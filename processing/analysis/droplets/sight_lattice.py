@@ -15,6 +15,8 @@ from processing.volume import VoxelGrid
 
 MAX_DEVIATION_PX = 0.01
 """What the lattice may add to the position of a droplet, which is measured to 0.02 px."""
+APART_DEG = 4.0
+"""Views along lines that are nearer than that, or that look at each other, tell the same of a droplet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,16 @@ class SightLattice:
         """What a motion of the whole volume by a voxel along x, y, z moves on average in the images: (2 views, 3)."""
         spans = [np.diff(self.nodes_px, axis=axis).mean(axis=(1, 2, 3)) for axis in (3, 2, 1)]
         return np.stack(spans, axis=-1).reshape(-1, 3) / self.spacing
+
+    @property
+    def directions(self) -> int:
+        """Along how many lines the views look that are apart; of two that look at each other one counts."""
+        lines: list[FloatArray] = []
+        for right, down in self.motion_px.reshape(-1, 2, 3):
+            line = np.cross(right, down) / np.linalg.norm(np.cross(right, down))
+            if all(abs(line @ other) < np.cos(np.deg2rad(APART_DEG)) for other in lines):
+                lines.append(line)
+        return len(lines)
 
     @property
     def pixels_per_voxel(self) -> float:

@@ -96,7 +96,7 @@ def measure_shadows(
         What a reticle of dots says, in the same light.
     twins : int
         Simulated twins of the exposure in which ghosts are counted: each costs as much as the exposure itself. Where
-        views are not four there is one at least.
+        views are not four, and apart, there is one at least.
     seed : int
         Of the twins.
     threads : int
@@ -120,7 +120,7 @@ def measure_shadows(
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind)
     fit = find_shadows(shot, search, light, before_round)
     told = told_real(judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes))))
-    count = twins_of(twins, len(images))
+    count = twins_of(twins, len(images), search.lattice.directions)
     if not count or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)

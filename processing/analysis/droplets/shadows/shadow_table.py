@@ -79,5 +79,6 @@ def _p_real(shot: Transmissions, fit: ShadowFit, supports: DiscSupports) -> Floa
         residual=supports.residual,
         crowding=crowding(shot.lattice.seen_px(places), areas_px2),
         width_px=width_px,
+        directions=shot.lattice.directions,
     )
     return REALITY.p_real(evidence, knowing_views(shot, fit, places))

@@ -67,6 +67,19 @@ def test_two_views_of_a_dense_spray_are_doubted_although_they_explain_their_imag
     assert (shot.verdict, shot.reasons[0][:25]) == (ShotVerdict.DOUBTFUL, "of the droplets of a twin")
 
 
+def test_views_along_the_same_lines_count_once() -> None:
+    """Four cameras, as two pairs that look alike or at each other, see as many ghosts as two."""
+    truth, rng = scene(DropletCase(28, views=2)), np.random.default_rng(1)
+    images = [image + rng.normal(0, 0.03, image.shape).astype(np.float32) for image in truth.images for _ in range(2)]
+    cameras = [camera for camera in truth.believed for _ in range(2)]
+    shot = measure_bright(images, plan_droplets(cameras, GRID, margin_voxel=MARGIN_VOXEL))
+    assert found_and_ghosts(shot, truth)[1] > 0.3
+    assert (shot.verdict, [reason[:25] for reason in shot.reasons]) == (
+        ShotVerdict.DOUBTFUL,
+        ["of the droplets of a twin"],
+    )
+
+
 def test_noise_and_widths_come_from_the_images(shot: BrightExposure) -> None:
     for view in shot.views.values():
         assert view.noise == pytest.approx(0.03, rel=0.03)

@@ -17,6 +17,7 @@ DROPLET = Evidence(
     residual=np.array([1.0]),
     crowding=np.array([0.05]),
     width_px=1.2,
+    directions=4,
 )
 BOTH = pytest.mark.parametrize("reality", [OF_SPOTS, OF_SHADOWS], ids=["spots", "shadows"])
 
@@ -50,6 +51,7 @@ def test_what_speaks_against_it_makes_it_less_probable(reality: Reality, worse: 
 def test_nothing_is_told_where_it_was_not_tried(reality: Reality) -> None:
     three = replace(DROPLET, alone=DROPLET.alone[:3], alone_sd=DROPLET.alone_sd[:3])
     untried = [three, replace(DROPLET, crowding=np.array([2.0])), replace(DROPLET, width_px=5.0)]
+    untried.append(replace(DROPLET, directions=2))
     assert np.isnan([told(reality, evidence) for evidence in untried]).all()
     assert np.isnan(reality.p_real(DROPLET, np.array([3]))).all()
 
