@@ -4,6 +4,8 @@ A sub-volume is a droplet of A and its nearest neighbours, so that it is small w
 of all pairs (A, B) within reach are points in a space of their own; the true pairs are a heap there, the wrong ones a
 fog. A heap is believed only if fog alone, as dense as it is around the heap, would hardly ever make one, and if no
 other heap is nearly as large. No motion need be guessed, and nothing depends on bins.
+
+Where all pairs make no such heap, those of droplets that are as large as each other may: there are fewer wrong ones.
 """
 
 from dataclasses import dataclass
@@ -13,12 +15,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.special import gammainc
 
+from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.geometry import FloatArray
 
 REACH_VOXEL = 25.0
 """The largest displacement that is looked for."""
-HEAP_VOXEL = 2.5
-"""Radius of a heap: scatter, and gradients across a sub-volume."""
+ALIKE = 0.1
+"""Of the natural logarithm of size: within it two droplets may be one."""
+LOOKS = ((2.5, np.inf), (2.5, ALIKE), (5.0, ALIKE))
+"""Radius of a heap in voxels, for scatter and gradients across a sub-volume, and by how much sizes of its pairs may
+differ: the first look that shows a heap is believed."""
 NEIGHBOURS, STRIDE = 60, 15
 """Droplets of a sub-volume; of so many droplets one is in the middle of a sub-volume."""
 FEWEST = 3
@@ -50,23 +56,26 @@ class CommonMotion:
         return len(self.places)
 
 
-def common_motion(first: FloatArray, second: FloatArray) -> CommonMotion:
+def common_motion(first: MovingDroplets, second: MovingDroplets) -> CommonMotion:
     """The commonest displacement of every sub-volume that has one.
 
     Parameters
     ----------
-    first, second : (N, 3) and (M, 3) arrays
-        Droplets of A and of B, in voxels.
+    first, second : MovingDroplets
+        Of A and of B.
     """
     if not len(first) or not len(second):
         return CommonMotion(np.empty((0, 3)), np.empty((0, 3)))
-    own, other = _within_reach(first, second)
-    displacements = second[other] - first[own]
+    own, other = _within_reach(first.places, second.places)
+    places, displacements = first.places[own], second.places[other] - first.places[own]
+    unlike = np.abs(second.log_sizes[other] - first.log_sizes[own])
     ends = np.searchsorted(own, np.arange(len(first) + 1))
     heaps = []
-    for window in _windows(first):
+    for window in _windows(first.places):
         chosen = np.concatenate([np.arange(ends[one], ends[one + 1]) for one in window])
-        if (heap := _heap(first[own[chosen]], displacements[chosen])) is not None:
+        looks = ((chosen[unlike[chosen] < most], radius) for radius, most in LOOKS)
+        found = (_heap(places[some], displacements[some], radius) for some, radius in looks)
+        if (heap := next((one for one in found if one is not None), None)) is not None:
             heaps.append(heap)
     middles, shifts = zip(*heaps, strict=True) if heaps else ((), ())
     return CommonMotion(np.reshape(middles, (-1, 3)), np.reshape(shifts, (-1, 3)))
@@ -86,27 +95,30 @@ def _within_reach(first: FloatArray, second: FloatArray) -> tuple[Indices, Indic
     return near.row[order].astype(np.intp), near.col[order].astype(np.intp)
 
 
-def _heap(places: FloatArray, displacements: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+def _heap(places: FloatArray, displacements: FloatArray, radius: float) -> tuple[FloatArray, FloatArray] | None:
     """Middle and displacement of the largest heap of pairs that begin at places; None where fog might be all."""
     if len(places) < FEWEST:
         return None
     tree = cKDTree(displacements)
-    counts = np.asarray(tree.query_ball_point(displacements, HEAP_VOXEL, return_length=True))
+    counts = np.asarray(tree.query_ball_point(displacements, radius, return_length=True))
     top = displacements[np.argmax(counts)]
-    rivals = counts[np.linalg.norm(displacements - top, axis=1) > 2 * HEAP_VOXEL]
+    rivals = counts[np.linalg.norm(displacements - top, axis=1) > 2 * radius]
     if counts.max() < FEWEST or rivals.max(initial=0) > RIVAL * counts.max():
         return None
-    if not _is_believed(tree, top, int(counts.max())):
+    if not _is_believed(tree, top, radius, int(counts.max())):
         return None
     for _ in range(MEAN_SHIFTS):
-        near = tree.query_ball_point(top, HEAP_VOXEL)
+        near = tree.query_ball_point(top, radius)
         top = displacements[near].mean(axis=0)
     return places[near].mean(axis=0), top
 
 
-def _is_believed(tree: cKDTree, top: FloatArray, count: int) -> bool:
-    """Whether fog would hardly make a heap of so many pairs, one of which is its middle."""
-    even = (tree.n - 1) * (HEAP_VOXEL / REACH_VOXEL) ** 3
-    around = len(tree.query_ball_point(top, 2 * HEAP_VOXEL)) - count
-    chance = tree.n * gammainc(count - 1, max(even, around / 7))  # the shell is 7 times as large as the heap
+def _is_believed(tree: cKDTree, top: FloatArray, radius: float, count: int) -> bool:
+    """Whether fog would hardly make a heap of so many pairs, one of which is its middle.
+
+    The shell around a heap is 7 times as large, of displacements within a layer 3 times, along a jet once: taken twice.
+    """
+    even = (tree.n - 1) * (radius / REACH_VOXEL) ** 3
+    around = len(tree.query_ball_point(top, 2 * radius)) - count
+    chance = tree.n * gammainc(count - 1, max(even, around / 2))
     return bool(chance < CHANCE)

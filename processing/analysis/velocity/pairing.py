@@ -70,14 +70,14 @@ def pair(first: MovingDroplets, second: MovingDroplets) -> Pairing:
     first, second : MovingDroplets
         Of A and B. Neither their order nor the axes matter.
     """
-    common, spread = common_motion(first.places, second.places), Spread()
+    common, spread = common_motion(first, second), Spread()
     known = KnownMotion(common.places, common.shifts, np.ones(len(common)), np.full(len(common), -1))
     found, shifts = _nobody(first, second), None
     for _ in range(ROUNDS if len(common) else 0):
         shifts = predicted(known, first.places)
         candidates = candidates_near(first, second, shifts)
         likely = likely_of(candidates, odds_of(candidates, first, second, spread))
-        spread = _renewed(candidates, likely, first, second)
+        spread = _renewed(spread, candidates, likely, first, second)
         found = partners_of(candidates, likely, len(first), len(second))
         (own,) = np.nonzero(found[0].partner >= 0)
         if len(own) < FEWEST:
@@ -91,11 +91,17 @@ def _nobody(first: MovingDroplets, second: MovingDroplets) -> tuple[Partners, Pa
     return Partners.none(len(first)), Partners.none(len(second))
 
 
-def _renewed(candidates: Candidates, likely: FloatArray, first: MovingDroplets, second: MovingDroplets) -> Spread:
-    """How partners differ, by the candidates, each as much as it is likely."""
+def _renewed(
+    spread: Spread, candidates: Candidates, likely: FloatArray, first: MovingDroplets, second: MovingDroplets
+) -> Spread:
+    """How partners differ, by the candidates, each as much as it is likely, and as well as its place is known.
+
+    One droplet with an error of voxels must not hide by how much the places of all others miss.
+    """
     own, other, total = candidates.own, candidates.other, likely.sum() + 1e-12
-    known = np.trace(first.covariance[own] + second.covariance[other], axis1=1, axis2=2)
-    square = likely @ (np.sum(candidates.misses**2, axis=1) - known) / total / 3
+    known = np.trace(first.covariance[own] + second.covariance[other], axis1=1, axis2=2) / 3
+    telling = likely / (known + spread.scatter**2) ** 2
+    square = telling @ (np.sum(candidates.misses**2, axis=1) / 3 - known) / (telling.sum() + 1e-12)
     unlike = likely @ (second.log_sizes[other] - first.log_sizes[own]) ** 2 / total
     share = total / np.sqrt(len(first) * len(second))
     return Spread(

@@ -165,3 +165,46 @@ def test_five_droplets_far_apart_are_paired() -> None:
         for shift in ((0, 0, 0), (9, 2, -4))
     )
     np.testing.assert_array_equal(pair(first, second).first.partner, np.arange(5))
+
+
+def test_one_droplet_that_is_known_badly_does_not_cost_the_others_their_partners() -> None:
+    """A droplet behind another one is known to some voxels; the motion around all others is known to 0.1 voxel."""
+    paired = 0.0
+    for seed in range(4):
+        first, second = exposures(seed, density_per_mm3=3.0, scatter=0.15, noise=0.01)
+        covariance = first.droplets.covariance.copy()
+        covariance[np.argmin(np.linalg.norm(first.droplets.places - BOX / 2, axis=1))] = np.diag([5.0, 4.0, 15.0])
+        known = replace(first.droplets, covariance=covariance)
+        paired += len(pair(known, second.droplets).pairs[0]) / in_both(first, second) / 4
+    assert paired > 0.97
+
+
+@pytest.mark.parametrize("seed", [2, 3, 10, 11])
+def test_few_droplets_whose_speed_goes_with_their_size_are_paired(seed: int) -> None:
+    """Nowhere do half of them go one way; pairs of two sizes are left aside."""
+    rng = np.random.default_rng(seed)
+    places, log_sizes = rng.uniform(0, (240, 50, 240), (14, 3)), np.log(rng.uniform(20, 80, 14))
+    shift = np.column_stack([np.zeros(14), 11 + 0.2 * (np.exp(log_sizes) - 50), np.zeros(14)])
+    first, second = (
+        MovingDroplets(
+            places + some * shift + rng.normal(0, 0.05, (14, 3)),
+            np.tile(0.05**2 * np.eye(3), (14, 1, 1)),
+            log_sizes + rng.normal(0, 0.01, 14),
+        )
+        for some in (0, 1)
+    )
+    own, other = pair(first, second).pairs
+    assert len(own) > 11
+    np.testing.assert_array_equal(own, other)
+
+
+@pytest.mark.parametrize("count", [5, 12, 40])
+def test_few_droplets_of_two_shots_have_no_partners(count: int) -> None:
+    rng = np.random.default_rng(count)
+    covariance = np.tile(0.05**2 * np.eye(3), (count, 1, 1))
+    for _ in range(20):
+        strangers = [
+            MovingDroplets(rng.uniform(0, (100, 50, 100), (count, 3)), covariance, np.log(rng.uniform(20, 80, count)))
+            for _ in range(2)
+        ]
+        assert not len(pair(*strangers).pairs[0])
