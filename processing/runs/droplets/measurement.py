@@ -33,6 +33,7 @@ from processing.runs.droplets.measured_shot import (
     shot_summary,
     shot_velocities,
 )
+from processing.runs.droplets.run_light import RunLight, known_shadows
 from processing.runs.errors import Stopped
 from processing.runs.exposure_faults import images_print
 from processing.runs.liquid.objects import RunObjects, told_objects
@@ -41,8 +42,6 @@ from processing.runs.measured_images import (
     odd_backgrounds,
     require_backgrounds,
     require_fitting,
-    shadow_images,
-    without_ignored,
 )
 from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results, provenance_of
@@ -79,6 +78,8 @@ class RunMeasurement:
         How liquid that is no droplet is looked for.
     conditions : dict of str to str
         What held of the run when the measurement was planned, whatever is mended meanwhile.
+    light : RunLight
+        In which shots with few droplets are, as others of the run say.
     """
 
     run: RunReader
@@ -89,6 +90,7 @@ class RunMeasurement:
     provenance: Provenance
     objects: RunObjects
     conditions: dict[str, str]
+    light: RunLight
 
     @classmethod
     def of(
@@ -125,7 +127,8 @@ class RunMeasurement:
         require_fitting(settings.ignored, {view: calibration.views[view].mapping.image_size_px for view in views})
         provenance = provenance_of(run, calibration, calibration_file, settings, METHOD_VERSION)
         objects = RunObjects.of(run, calibration, references, grid, settings.nozzle, settings.ignored)
-        return cls(run, calibration, settings, search, references, provenance, objects, conditions_of(run))
+        light = RunLight(run, search, references, settings.ignored)
+        return cls(run, calibration, settings, search, references, provenance, objects, conditions_of(run), light)
 
     def measure(
         self,
@@ -229,17 +232,17 @@ class RunMeasurement:
         return measured, [image / max(brightest, 1e-6) for image in images], ()
 
     def _shadows(self, shot: Shot, frame: FrameName, threads: int, before_round: Callable[[], None]) -> _Found:
-        images, trust = shadow_images(self.run, shot, frame, self.references)
-        known = without_ignored(dict(zip(shot.views, trust, strict=True)), self.settings.ignored)
+        images, trust = known_shadows(self.run, shot, frame, self.references, self.settings.ignored)
         measured = measure_shadows(
             images,
             self.search,
-            trust=list(known.values()),
+            trust=trust,
             light=self.settings.light,
             sizes=SizeCorrection.of(self.settings.sizes) if self.settings.sizes else None,
             twins=self.settings.twins,
             seed=self.settings.seed + shot.index,
             threads=threads,
             before_round=before_round,
+            known_light=lambda: self.light.seen(threads, before_round),
         )
         return measured, [1 - one for one in images], odd_backgrounds(self.run, shot, frame, self.references)

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
-from processing.analysis.droplets.shadows.light_search import Light, stated_ratio
+from processing.analysis.droplets.shadows.light_search import LEAST_DROPLETS, Light, SeenLight, stated_ratio
 from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_candidates import Stage
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
@@ -34,11 +34,16 @@ PURGES, SETTLED = 6, 0.003
 """So often at most disputed droplets are dropped and found anew; it ends when the others stay as many, about."""
 
 
+def nobody_knows() -> SeenLight | None:
+    """Nobody but the droplets of an exposure says which light it is in."""
+
+
 def find_shadows(
     shot: Transmissions,
     search: DropletSearch,
     light: Light = "estimated",
     before_round: Callable[[], None] = keep_on,
+    known_light: Callable[[], SeenLight | None] = nobody_knows,
 ) -> ShadowFit:
     """Find the droplets of one exposure.
 
@@ -53,12 +58,15 @@ def find_shadows(
         Gaussian blur; where another light explains them better, the search goes on in that.
     before_round : callable
         Called before each round; what it raises ends the search.
+    known_light : callable
+        Asked for a light that is to be estimated where droplets are too few to vote: what those of other shots say.
     """
     if light != "estimated":
         return _found(shot, search, stated_ratio(light), before_round)
     fit = _found(shot, search, None, before_round)
     finder = ShadowRounds(shot, search, before_round)
-    seen = finder.light(fit)
+    few = 0 < len(fit.discs) < LEAST_DROPLETS
+    seen = (known_light() if few else None) or finder.light(fit)
     if seen.condenser_ratio is not None:
         fit = _purged(finder, finder.relit(fit, seen.condenser_ratio))
     return replace(fit, light_share=seen.share, light_sd_voxel=seen.radius_sd)

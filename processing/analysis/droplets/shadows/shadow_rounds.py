@@ -91,12 +91,16 @@ class ShadowRounds:
 
     def light(self, fit: ShadowFit) -> SeenLight:
         """What the droplets say of the light."""
+        return seen_light(lambda ratio: self.in_light(fit, ratio), resolved=self.resolves_light(fit))
 
-        def in_light(condenser_ratio: float | None) -> Relit:
-            other = self.relit(fit, condenser_ratio)
-            return Relit(self._supports(other).residual ** 2, other.discs.radii_voxel)
+    def in_light(self, fit: ShadowFit, condenser_ratio: float | None) -> Relit:
+        """The droplets in some light, and what it leaves around each."""
+        other = self.relit(fit, condenser_ratio)
+        return Relit(self._supports(other).residual ** 2, other.discs.radii_voxel)
 
-        return seen_light(in_light, resolved=self._blur_px(fit) >= LEAST_BLUR_PX)
+    def resolves_light(self, fit: ShadowFit) -> bool:
+        """Whether pixels are fine enough to tell the light."""
+        return self._blur_px(fit) >= LEAST_BLUR_PX
 
     def relit(self, fit: ShadowFit, condenser_ratio: float | None) -> ShadowFit:
         """The very same droplets in other light, fitted to it."""

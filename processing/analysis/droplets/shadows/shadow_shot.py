@@ -18,10 +18,10 @@ from processing.analysis.droplets.shadows.judged_volume import (
     judging_views,
     knowing_views,
 )
-from processing.analysis.droplets.shadows.light_search import Light
+from processing.analysis.droplets.shadows.light_search import Light, SeenLight
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs
-from processing.analysis.droplets.shadows.shadow_finder import behind_gaussian_blur, find_shadows
+from processing.analysis.droplets.shadows.shadow_finder import behind_gaussian_blur, find_shadows, nobody_knows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise, seen_by
 from processing.analysis.droplets.shadows.shadow_light import covered_share, judged_by_light, judged_by_shape, unlit
 from processing.analysis.droplets.shadows.shadow_table import sized_droplets
@@ -79,6 +79,7 @@ def measure_shadows(
     seed: int = 0,
     threads: int = DEFAULT_THREADS,
     before_round: Callable[[], None] = keep_on,
+    known_light: Callable[[], SeenLight | None] = nobody_knows,
 ) -> ShadowExposure:
     """Measure the droplets of one exposure of shadows.
 
@@ -103,6 +104,8 @@ def measure_shadows(
         The result does not depend on it.
     before_round : callable
         Called before each round of the search; what it raises ends it.
+    known_light : callable
+        Asked for an estimated light where droplets are too few to vote.
 
     Raises
     ------
@@ -114,11 +117,11 @@ def measure_shadows(
     check_images(trusts, search)
     if reasons := _unmeasurable(images, trusts, search):
         return _refused(*reasons)
-    shot = _looking(images, trusts, search, threads)
+    shot = looking(images, trusts, search, threads)
     known_shadows = [(1 - image) * np.sqrt(one) for image, one in zip(shot.images, shot.trust, strict=True)]
     if blind := blind_verdict(known_shadows, shot.noises_of(shot.images), search.names):
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind)
-    fit = find_shadows(shot, search, light, before_round)
+    fit = find_shadows(shot, search, light, before_round, known_light)
     told = told_real(judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes))))
     count = twins_of(twins, len(images), search.lattice.directions)
     if not count or told.verdict is not ShotVerdict.GOOD:
@@ -185,7 +188,7 @@ def _unseen(trusts: Sequence[Image], into_grid: Sequence[NDArray[np.bool_]], nam
     return f"{', '.join(unseen)}: no pixel that is known looks into the grid: is it outside of the images, or too thin?"
 
 
-def _looking(images: Sequence[Image], trusts: Sequence[Image], search: DropletSearch, threads: int) -> Transmissions:
+def looking(images: Sequence[Image], trusts: Sequence[Image], search: DropletSearch, threads: int) -> Transmissions:
     """Transmissions of pixels that look into what is searched; of others nothing is known, and no shadow is there."""
     chosen, windows = search.pixels_into_search(), search.windows()
     known = zip(images, trusts, chosen, windows, strict=True)
