@@ -4,6 +4,8 @@ Nothing but both exposures tells it: a faint light from elsewhere, a pulse that 
 one make diameters smaller and leave hardly a trace in one exposure by itself.
 """
 
+import math
+
 import numpy as np
 
 from processing.analysis.droplets.droplet_table import DropletRows, SizedDroplets
@@ -37,20 +39,36 @@ def unlike_sizes(first: DropletRows, second: DropletRows, velocities: MeasuredVe
     (own,) = np.nonzero((partners.partner >= 0) & (partners.p_pair > LEAST_P_PAIR))
     if len(own) < FEWEST or velocities.separation_ns > LONGEST_NS:
         return ""
-    before, after = first.diameters_um[own], second.diameters_um[partners.partner[own]]
-    common = np.hypot(_common(first), _common(second))
-    growth = _growth(np.log(after / before), LEAST_UNLIKE + COMMON_SIGMAS * float(common))
+    before_um, after_um = first.diameters_um[own], second.diameters_um[partners.partner[own]]
+    shares = (common_share(one.diameter_sd_um, one.diameters_um) for one in (first, second))
+    return unlike_told(before_um, after_um, math.hypot(*shares), velocities.separation_ns)
+
+
+def unlike_told(before_um: FloatArray, after_um: FloatArray, common: float, separation_ns: float) -> str:
+    """What is wrong with diameters of the very same droplets in A and in B; empty where nothing says so.
+
+    Parameters
+    ----------
+    before_um, after_um : (N,) arrays
+        In A, and in B.
+    common : float
+        Standard deviation that all ratios share.
+    separation_ns : float
+        From A to B.
+    """
+    growth = _growth(np.log(after_um / before_um), LEAST_UNLIKE + COMMON_SIGMAS * common)
     if not growth:
         return ""
     return (
         f"the very same droplets are {100 * abs(np.expm1(growth)):.1f} % {'larger' if growth > 0 else 'smaller'} in "
-        f"exposure B than in A, {velocities.separation_ns / 1000:.3g} us before: diameters of one of them are wrong. "
+        f"exposure B than in A, {separation_ns / 1000:.3g} us before: diameters of one of them are wrong. "
         "Has each its own dark image and background, are both pulses as long, and is there no light besides?"
     )
 
 
-def _common(droplets: SizedDroplets) -> float:
-    return float(np.percentile(droplets.diameter_sd_um / droplets.diameters_um, SUREST))
+def common_share(sd_um: FloatArray, diameters_um: FloatArray) -> float:
+    """Standard deviation that all diameters of an exposure share, relative: that of those which are known best."""
+    return float(np.percentile(sd_um / diameters_um, SUREST))
 
 
 def _growth(changes: FloatArray, allowed: float) -> float:

@@ -206,6 +206,7 @@ def _result(
     from processing.analysis.copied_shots import copies_told
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.droplets.droplet_statistics import droplet_statistics
+    from processing.analysis.few_together import few_together
     from processing.analysis.lingering_droplets import lingering_told
     from processing.analysis.near_or_far import depth_doubts, sights_of
     from processing.analysis.velocity.velocity_statistics import velocity_statistics
@@ -220,6 +221,7 @@ def _result(
         "copies": _told(copies_told(stored)),
         "same_droplets": _told(lingering_told(stored)),
         "depth": _told(depth_doubts(stored)),
+        "few_together": _told(few_together(stored)),
         "polarity": settings.polarity,
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "grid": settings.model_dump(mode="json")["grid"],

@@ -10,6 +10,7 @@ import numpy as np
 
 from processing.analysis.copied_shots import copies_told
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.few_together import few_together
 from processing.analysis.lingering_droplets import lingering_told
 from processing.analysis.near_or_far import depth_doubts
 from processing.analysis.shot_doubts import exposure_doubts, velocity_doubts
@@ -52,6 +53,7 @@ def spray_doubts(
     """
     return (
         *exposure_doubts(shots),
+        *few_together(shots),
         *velocity_doubts(shots),
         *copies_told(shots),
         *lingering_told(shots),

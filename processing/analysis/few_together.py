@@ -1,0 +1,70 @@
+"""What shots with few droplets say together of their images, which each of them by itself has too few droplets to say.
+
+Of shots with more droplets each has been asked by itself.
+"""
+
+import json
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from processing.analysis.droplets.droplet_file import DIAMETER, StoredDroplets
+from processing.analysis.droplets.shadows.light_search import LEAST_DROPLETS
+from processing.analysis.droplets.shadows.masked_liquid import UNEXPLAINED
+from processing.analysis.droplets.shadows.shadow_light import MANY_UNLIKE
+from processing.analysis.unlike_sizes import FEWEST, LEAST_P_PAIR, LONGEST_NS, common_share, unlike_told
+from processing.geometry import FloatArray
+
+SD, RESIDUAL = "diameter_sd_um", "residual"
+
+
+def few_together(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
+    """For people: what is wrong with shapes, or with diameters of B beside A; nothing where nothing says so."""
+    sized = [shot for shot in shots if {DIAMETER, SD, RESIDUAL} <= shot.columns.keys()]
+    told = (_shapes(sized), _sizes(sized))
+    return tuple(f"shots with few droplets together: {what}" for what in told if what)
+
+
+def _shapes(shots: Sequence[StoredDroplets]) -> str:
+    exposures = [
+        np.asarray(shot.columns[RESIDUAL], np.float64)[shot.columns["frame"] == frame]
+        for shot in shots
+        for frame in "ab"
+    ]
+    few = [one for one in exposures if len(one) < LEAST_DROPLETS]
+    left = np.concatenate([np.empty(0), *few])
+    unlike = int(np.count_nonzero(left > UNEXPLAINED))
+    if len(left) < LEAST_DROPLETS or unlike <= MANY_UNLIKE * len(left):
+        return ""
+    return (
+        f"{100 * unlike / len(left):.0f} % of {len(left)} droplets, limit {100 * MANY_UNLIKE:.0f} %, do not look like "
+        "round opaque discs: do they move while the light is on, is it on twice within an exposure, or are images "
+        "processed? Number and diameters are wrong then"
+    )
+
+
+def _sizes(shots: Sequence[StoredDroplets]) -> str:
+    pairs = [few for shot in shots if len(few := _pairs(shot)) < FEWEST]
+    separations_ns = [ns for shot in shots if (ns := _separation_ns(shot)) is not None]
+    if sum(map(len, pairs)) < FEWEST or max(separations_ns) > LONGEST_NS:
+        return ""
+    before_um, after_um, before_sd_um, after_sd_um = np.concatenate(pairs).T
+    common = math.hypot(common_share(before_sd_um, before_um), common_share(after_sd_um, after_um))
+    return unlike_told(before_um, after_um, common, float(np.median(separations_ns)))
+
+
+def _pairs(shot: StoredDroplets) -> FloatArray:
+    """Diameters of A and B and their standard deviations, (N, 4), of the droplets that both show."""
+    columns = shot.columns
+    if "partner" not in columns:
+        return np.empty((0, 4))
+    partner, p_pair = np.asarray(columns["partner"], np.intp), np.asarray(columns["p_pair"], np.float64)
+    (own,) = np.nonzero((columns["frame"] == "a") & (partner >= 0) & (p_pair > LEAST_P_PAIR))
+    known = (np.asarray(columns[name], np.float64) for name in (DIAMETER, SD))
+    return np.column_stack([one[rows] for one in known for rows in (own, partner[own])])
+
+
+def _separation_ns(shot: StoredDroplets) -> float | None:
+    told = json.loads(str(shot.provenance.get("velocity", "{}")))
+    return None if (stated := told.get("separation_ns")) is None else float(stated)

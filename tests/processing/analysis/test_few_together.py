@@ -1,0 +1,56 @@
+"""Shots with few droplets are as good as they look only if all of them together say nothing else."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.few_together import few_together
+from processing.analysis.spray.spray_doubts import spray_doubts
+
+
+def shots(
+    count: int = 8, droplets: int = 4, *, ratio: float = 1.0, unlike: float = 0.0, separation_ns: float = 6400.0
+) -> list[StoredDroplets]:
+    """Double exposures whose droplets look larger in B by a ratio, and some unlike round discs."""
+    rng = np.random.default_rng(2)
+    several = []
+    for _ in range(count):
+        true_um = rng.uniform(20, 90, droplets)
+        seen_um = np.concatenate([true_um, ratio * true_um]) * np.exp(rng.normal(0, 0.004, 2 * droplets))
+        partner = np.arange(2 * droplets)
+        columns: dict[str, NDArray[Any]] = {
+            "frame": np.repeat(np.array(["a", "b"]), droplets),
+            "diameter_um": seen_um,
+            "diameter_sd_um": np.full(2 * droplets, 0.2),
+            "residual": np.where(rng.random(2 * droplets) < unlike, 2.0, 1.0),
+            "partner": np.where(partner < droplets, partner + droplets, partner - droplets),
+            "p_pair": np.full(2 * droplets, 0.99),
+        }
+        provenance: dict[str, str | int | float] = {"velocity": json.dumps({"separation_ns": separation_ns})}
+        several.append(StoredDroplets(columns, provenance))
+    return several
+
+
+@pytest.mark.parametrize(("ratio", "word"), [(0.95, "smaller in exposure B"), (1.05, "larger in exposure B")])
+def test_droplets_that_shrink_or_grow_from_a_to_b_are_told(ratio: float, word: str) -> None:
+    assert word in "".join(few_together(shots(ratio=ratio)))
+
+
+def test_figures_of_a_spray_are_doubted() -> None:
+    assert "smaller in exposure B" in "".join(spray_doubts(shots(ratio=0.95), None, None))
+
+
+def test_droplets_that_do_not_look_like_discs_are_told() -> None:
+    assert "do not look like round opaque discs" in "".join(few_together(shots(unlike=0.3)))
+
+
+def test_nothing_is_told_of_good_shots_nor_of_many_droplets_nor_of_slow_ones_nor_of_hardly_any() -> None:
+    assert not few_together(shots())
+    assert not few_together(shots(droplets=40, ratio=0.9, unlike=0.3))
+    assert not few_together(shots(ratio=0.9, separation_ns=2e6))
+    assert not few_together(shots(2, 2, ratio=0.9, unlike=0.8))
+    assert not few_together([])
