@@ -63,11 +63,33 @@ def check_few(
     PipelineError
         An exposure is missing.
     """
+    few = list(dict.fromkeys((shots[0], shots[len(shots) // 2], shots[-1])))
+    return _checked(run_dir, few, _seen_in(run_dir, calibration), workbench)
+
+
+def check_each(
+    run_dir: Path, shots: Sequence[int], calibration: Calibration, workbench: Workbench | None = None
+) -> list[ShotCheck]:
+    """Check all of some shots, each by itself: what is wrong need not be the same in any two of them.
+
+    Views of the calibration that the run lacks are left out.
+
+    Raises
+    ------
+    CalibrationError
+        The calibration is refused, or does not belong to the views of the run.
+    PipelineError
+        An exposure is missing.
+    """
+    seen, workbench = _seen_in(run_dir, calibration), workbench or Workbench()
+    return [check_shot(run_dir, shot, seen, workbench) for shot in shots]
+
+
+def _seen_in(run_dir: Path, calibration: Calibration) -> Calibration:
+    """The views that a run has."""
     with RunReader(run_dir) as run:
         calibration.require_usable(run.header.views)
-        seen = replace(calibration, views={name: calibration.views[name] for name in run.header.views})
-    few = list(dict.fromkeys((shots[0], shots[len(shots) // 2], shots[-1])))
-    return _checked(run_dir, few, seen, workbench)
+        return replace(calibration, views={name: calibration.views[name] for name in run.header.views})
 
 
 def odd_images(run_dir: Path, shot: int, workbench: Workbench) -> tuple[str, ...]:

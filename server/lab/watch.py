@@ -97,6 +97,7 @@ class _Account:
     newest: dict[str, Any] | None = None
     worst: dict[str, Any] | None = None
     sights: dict[str, int] = field(default_factory=dict)
+    results_id: str | None = None
 
     def note(self, job: Job) -> None:
         """Keep what a check that has ended says: the newest, and the worst of those that tell."""
@@ -164,15 +165,19 @@ class CalibrationWatch:
             before, account.standing = account.standing, self._judged(account, job)
             following = account.next_shot
         self._tell(before, account.standing)
-        return None if following is None else self.next_check(job.run_id, job.calibration, following, content)
+        if following is None:
+            return self._check_of_odd(job)
+        return self.next_check(job.run_id, job.calibration, following, content)
 
     def _check_of_odd(self, job: Job) -> Job | None:
         """The check of a shot in which lines of sight meet seldom; none while another shot waits to be checked."""
         with self._lock:
             account = self._accounts.get((job.run_id, job.calibration))
-            seldom = seldom_meeting(self._meetings.of((job.run_id, job.results_id), dict))
             if account is None or account.next_shot is not None:
                 return None
+            if job.kind is JobKind.RECONSTRUCTION:
+                account.results_id = job.results_id
+            seldom = seldom_meeting(self._meetings.of((job.run_id, account.results_id), dict))
             odd = next((shot for shot in seldom if shot not in account.asked), None)
             if odd is None:
                 return None

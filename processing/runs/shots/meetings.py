@@ -21,8 +21,6 @@ SELDOM = 0.5
 """Of how often lines of sight meet in half of the shots."""
 MISSED = 3.0
 """Standard deviations of the count that is missed."""
-MOST_ODD = 3
-"""Shots that are then asked in full."""
 PALE = 0.85
 """Of the usual contrast: a view that is less sharp by the size of a droplet, or a third darker over half of it."""
 SURE = 5.0
@@ -63,7 +61,7 @@ def stored_meetings(exposures: Iterable[StoredExposure]) -> dict[ExposureKey, Me
 
 
 def seldom_meeting(meetings: Meetings) -> list[int]:
-    """Shots in which lines of sight meet much more seldom than in the others; a few, the most seldom first.
+    """Shots in which lines of sight meet much more seldom than in the others, the most seldom first.
 
     Of a shot that exposure counts in which they are fewer.
     """
@@ -73,7 +71,7 @@ def seldom_meeting(meetings: Meetings) -> list[int]:
     usual = float(np.median(list(counts.values()))) if counts else 0.0
     least = min(SELDOM * usual, usual - MISSED * np.sqrt(usual))
     odd = [shot for shot, count in counts.items() if count < least]
-    return sorted(odd, key=counts.__getitem__)[:MOST_ODD]
+    return sorted(odd, key=counts.__getitem__)
 
 
 def pale_views(meetings: Meetings) -> dict[ExposureKey, dict[str, str]]:

@@ -233,6 +233,19 @@ def test_a_shot_in_which_lines_of_sight_meet_seldom_is_checked_and_stops_no_othe
     assert made(watch, 6)[0] is None, "each of them once"
 
 
+def test_every_shot_that_stands_out_is_checked_one_after_the_other() -> None:
+    """Their volumes come before the first of their checks has ended, and none comes afterwards."""
+    watch, _ = watch_of([0.1])
+    for shot in range(8):
+        made(watch, shot)
+    following, *_ = [made(watch, shot, droplets=shot - 6)[0] for shot in range(8, 13)]
+    asked = []
+    while following is not None:
+        asked.append(following.shot)
+        following = watch.learn(ended(following.shot, 2.0))
+    assert sorted(asked) == [8, 9, 10, 11, 12]
+
+
 def test_a_view_that_is_pale_is_told_with_the_volumes_of_its_shot() -> None:
     watch, _ = watch_of([])
     assert [made(watch, shot)[1] for shot in range(3)] == [""] * 3

@@ -8,12 +8,13 @@ import cv2
 import numpy as np
 import pytest
 
-from processing.calibration.calibration_file import save_calibration
+from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.reconstruction.volume_file import read_volume
 from processing.runs.results_file import ExposureKey
 from processing.runs.shots.meetings import Meeting, pale_views, seldom_meeting
 from processing.synthetic.stamping import FloatImage
 from server.cli.main import main
+from server.cli.runs.belonging import Belonging, ask_seldom
 from tests.support.command_line import told
 from tests.support.drifting_run import write_droplet_run
 from tests.support.drifting_views import calibration_of, views
@@ -134,6 +135,23 @@ def test_no_shot_stands_out_where_all_are_alike_or_droplets_few() -> None:
     for counts in ({}, {0: 0, 1: 0}, {0: 9, 1: 0}, {0: 30, 1: 18, 2: 40, 3: 31}, dict.fromkeys(range(9), 50)):
         assert odd_of(counts) == []
     assert odd_of({0: 30, 1: 12, 2: 40, 3: 31, 4: 2}) == [4, 1]
+
+
+def test_all_shots_that_stand_out_are_named() -> None:
+    counts = dict.fromkeys(range(20), 50) | {2: 5, 7: 3, 8: 1, 11: 4, 16: 2}
+    assert odd_of(counts) == [8, 16, 7, 11, 2]
+
+
+def test_of_very_many_shots_that_stand_out_those_that_are_not_asked_are_named(
+    calibration_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run_dir = write_droplet_run(tmp_path / "run", shots=6, drifting=(1, 2, 4))
+    monkeypatch.setattr("server.cli.runs.belonging.MOST_SELDOM", 1)
+    asked = ask_seldom(Belonging("run", ()), [2, 4, 1], run_dir, load_calibration(calibration_file))
+    assert [(check.shot, check.moved) for check in asked.checks] == [(2, "view2")]
+    assert asked.record()["not_asked"] == [1, 4]
+    assert "NOT CHECKED" in asked.text
+    assert "shots 1, 4" in asked.text
 
 
 def test_what_droplets_do_not_tell_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
