@@ -1,5 +1,6 @@
 """How much of its background's light an exposure has, by view: with less of it, all of its volume is fainter.
 
+With more of it shadows that are not black are fainter: what is brighter than the background counts as nothing there.
 Droplets are measured against the light around them, and do not care. Values of volumes do: MLOS multiplies the views.
 """
 
@@ -49,14 +50,19 @@ def stored_settings(exposure: StoredExposure) -> ReconstructionSettings:
 
 
 def fainter(shares: Shares, settings: ReconstructionSettings) -> float:
-    """By which share values of a volume are fainter than in full light; brighter light is another fault.
+    """By which share values of a volume are fainter than in full light: in more light, those of half-dark shadows.
 
     Without a sliding minimum, light that is missing is part of all intensities: what is black is as intense as ever.
     """
-    left = [min(share, 1.0) for share in shares.values() if settings.minimum_window_px]
+    left = [_left(share) for share in shares.values() if settings.minimum_window_px or share > 1]
     if settings.method is ReconstructionMethod.MINLOS:
         return 1 - min(left, default=1.0)
     return 1 - math.prod(left) ** (1 if settings.method is ReconstructionMethod.MLOS else 1 / max(len(left), 1))
+
+
+def _left(share: float) -> float:
+    """Of the intensity: light that is missing takes its share, light in excess as much of a shadow of a half."""
+    return share if share <= 1 else max(2 - share, 0.0)
 
 
 def light_line(shares: Mapping[ExposureKey, Shares], settings: ReconstructionSettings) -> str:
@@ -67,8 +73,11 @@ def light_line(shares: Mapping[ExposureKey, Shares], settings: ReconstructionSet
         return ""
     shot, frame = faintest = max(faint, key=lost.__getitem__)
     views = ", ".join(f"{view} {100 * share:.0f} %" for view, share in shares[faintest].items())
-    how_much = f"voxels by {settings.method.value} are up to {100 * lost[faintest]:.0f} % fainter for that alone"
+    is_more = max(shares[faintest].values()) - 1 > 1 - min(shares[faintest].values())
+    whose = "of half-dark shadows " if is_more else ""
+    how_much = f"voxels {whose}by {settings.method.value} are up to {100 * lost[faintest]:.0f} % fainter for that alone"
     return (
-        f"light: {len(faint)} of {len(lost)} exposures had less than their backgrounds: {how_much} (shot {shot}, "
-        f"exposure {frame.upper()}: {views}); compare no values of other light, or record the background anew"
+        f"light: {len(faint)} of {len(lost)} exposures had less or more than their backgrounds: {how_much} "
+        f"(shot {shot}, exposure {frame.upper()}: {views}); compare no values of other light, or record the "
+        "background anew"
     )

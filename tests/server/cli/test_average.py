@@ -125,7 +125,10 @@ def test_dim_light_is_told_once_with_what_it_makes_fainter(
 ) -> None:
     run_dir = add_background(write_run(tmp_path / "dim", shots=2), 222)
     options = ["--calibration", calibration_file, f"--grid={GRID}"]
-    line = "had less than their backgrounds: voxels by mlos are up to 27 % fainter for that alone (shot 0, exposure A"
+    line = (
+        "had less or more than their backgrounds: voxels by mlos are up to 27 % fainter for that alone (shot 0, "
+        "exposure A"
+    )
     assert f"light: 4 of 4 exposures {line}" in shown(capsys, "reconstruct", run_dir, *options, "-o", tmp_path / "out")
     source = [run_dir, *options] if straight else [tmp_path / "out"]
     told_of_mean = shown(capsys, "average", *source, "-o", tmp_path / "mean.vtkhdf")

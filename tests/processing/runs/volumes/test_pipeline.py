@@ -219,8 +219,23 @@ def test_the_light_of_a_shot_is_kept_with_its_volume_and_told_where_values_are_c
     brightest = [float(read_volume(file)[0].max()) for file in seen]
     assert fainter(dim.light[0, "a"], settings) == pytest.approx(1 - brightest[1] / brightest[0], abs=0.04)
     assert light_line(bright.light, settings) == ""
-    assert light_line(dim.light, settings).startswith("light: 2 of 2 exposures had less than their backgrounds")
+    assert light_line(dim.light, settings).startswith("light: 2 of 2 exposures had less or more than their backgrounds")
     assert light_line(dim.light, settings.model_copy(update={"minimum_window_px": 0})) == ""
+
+
+@pytest.mark.parametrize("window_px", [0, 201])
+def test_light_in_excess_of_the_background_is_told(window_px: int, calibration_file: Path, tmp_path: Path) -> None:
+    """What is brighter than the background counts as nothing, so that pale shadows are paler."""
+    settings = SETTINGS.model_copy(update={"minimum_window_px": window_px})
+    values = []
+    for counts in (200, 188):
+        shot = reconstructed(add_background(write_run(tmp_path / str(counts)), counts), calibration_file, settings)
+        values.append(read_volume(tmp_path / str(counts) / "results" / shot.volumes[0].file)[0])
+    half_dark = np.argmin(np.abs(values[0] - 0.5**4))
+    assert values[1].ravel()[half_dark] < 0.9 * values[0].ravel()[half_dark]
+    told = light_line(shot.light, settings)
+    assert told.startswith("light: 2 of 2 exposures had less or more than their backgrounds: voxels of half-dark")
+    assert "106 %" in told
 
 
 def test_twelve_bits_in_words_of_sixteen_are_told(calibration_file: Path, tmp_path: Path) -> None:
