@@ -21,6 +21,8 @@ MOST_UNLIKE = 0.2
 """Half the sum of the differences between opposite sectors, over all droplets: chance and gusts have less."""
 MOST_UNSURE = 0.5
 """Width of the interval of the nozzle along the axis, over its distance from the middle of the droplets."""
+MOST_SWIRL = 0.1
+"""Of the mean radial direction, around the axis: more draws the nozzle farther than its interval says."""
 SECTORS, ROUNDS = 8, 3
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
@@ -35,6 +37,14 @@ class ProposedAxis(FrozenValue):
     axis: Annotated[tuple[float, float, float] | None, Field(description="mean direction, a unit vector")] = None
     axis_within_deg: Annotated[float | None, Field(description="of the axis, with 95 %")] = None
     reason: Annotated[str | None, Field(description="why there is none, or no nozzle")] = None
+
+    @property
+    def believed(self) -> SprayAxis | None:
+        """Nozzle and axis, where both are proposed."""
+        if self.nozzle_mm is None or self.axis is None:
+            return None
+        x, y, z = (one.value for one in self.nozzle_mm)
+        return SprayAxis((x, y, z), self.axis)
 
     @property
     def words(self) -> str:
@@ -52,6 +62,9 @@ NO_VELOCITIES = "fewer than 100 droplets have a velocity: measure double exposur
 NOT_ALIKE = (
     "the spray is not alike on both sides of its mean direction: it has no axis of symmetry, or the box cuts it to one "
     "side; state nozzle and axis"
+)
+SWIRLS = (
+    "droplets fly around the axis, too (a swirl), so lines along their velocities do not meet at the nozzle: state it"
 )
 PARALLEL = "droplets fly too much alike to say where they come from: state the nozzle"
 
@@ -87,6 +100,7 @@ def proposed_axis(sample: SpraySample) -> ProposedAxis:
     widths_mm = np.array([one.high - one.low for one in nozzle])
     far_mm = abs((flying.points_mm.mean(axis=0) - nozzle_mm) @ axis)
     reason = PARALLEL if np.linalg.norm(widths_mm * axis) > MOST_UNSURE * far_mm else None
+    reason = SWIRLS if _swirls(SprayAxis((*nozzle_mm,), (*axis,)), flying) else reason
     x, y, z = nozzle
     u, v, w = axis.tolist()
     return ProposedAxis(
@@ -107,15 +121,16 @@ def _addends(ways: FloatArray, points_mm: FloatArray) -> FloatArray:
 
 
 def _figures(sums: FloatArray, scatter2: float) -> FloatArray:
-    """Nearest point and direction (rows, 6) of sums (rows, 16)."""
+    """Nearest point and direction (rows, 6) of sums (rows, 16); of no droplets not a number."""
     matrix = np.empty((len(sums), 3, 3))
     for number, (one, other) in enumerate(PAIRS):
         matrix[:, one, other] = matrix[:, other, one] = sums[:, number]
     count = sums[:, 15, None, None]
     right = sums[:, 6:9] - scatter2 * sums[:, 9:12]
     points = np.einsum("rij,rj->ri", np.linalg.pinv(matrix - scatter2 * count * np.eye(3), hermitian=True), right)
-    directions = sums[:, 12:15] / np.linalg.norm(sums[:, 12:15], axis=1, keepdims=True)
-    return np.hstack([points, directions])
+    with np.errstate(invalid="ignore"):
+        directions = sums[:, 12:15] / np.linalg.norm(sums[:, 12:15], axis=1, keepdims=True)
+    return np.where(count[:, :, 0] > 0, np.hstack([points, directions]), np.nan)
 
 
 def _scatter2(ways: FloatArray, points_mm: FloatArray) -> float:
@@ -141,3 +156,18 @@ def _unlike(axis: SprayAxis, points_mm: FloatArray) -> float:
     _, _, azimuth_deg = axis.coordinates(points_mm)
     counts = np.bincount((azimuth_deg * SECTORS / 360).astype(np.intp) % SECTORS, minlength=SECTORS)
     return float(np.abs(counts - np.roll(counts, SECTORS // 2)).sum() / 2 / counts.sum())
+
+
+def _swirls(axis: SprayAxis, flying: SpraySample) -> bool:
+    """Whether droplets fly around the axis, more than chance and more than a little of how they fly away from it."""
+    ways = flying.velocities_m_s / np.linalg.norm(flying.velocities_m_s, axis=1, keepdims=True)
+    _, radial = axis.components(ways, flying.points_mm)
+    around = axis.around(ways, flying.points_mm)
+
+    def around_of(drawn: SpraySample) -> Figures:
+        sums = drawn.totals(np.column_stack([around, np.ones(len(around))]))
+        return lambda counts: sums(counts)[:, :1] / np.maximum(sums(counts)[:, 1:], 1)
+
+    (told,) = flying.estimated(around_of, signed=True)
+    sure = told is not None and told.low * told.high > 0
+    return sure and abs(around.mean()) > MOST_SWIRL * abs(radial.mean())

@@ -7,6 +7,8 @@ import numpy as np
 
 from processing.geometry import FloatArray
 
+LEAST_FORWARDS = 0.2
+"""Cosine from the axis of a direction that leads back to the nozzle."""
 LATTICE = 48
 """Points of a box along its longest edge, to say which part of a cell lies in it."""
 
@@ -50,6 +52,22 @@ class SprayAxis:
         _, _, azimuth_deg = self.coordinates(points_mm)
         angle = np.radians(azimuth_deg)
         return axial, first * np.cos(angle) + second * np.sin(angle)
+
+    def around(self, velocities_m_s: FloatArray, points_mm: FloatArray) -> FloatArray:
+        """Velocity around the axis, towards growing azimuths; (N,)."""
+        _, first, second = self.frame @ velocities_m_s.T
+        _, _, azimuth_deg = self.coordinates(points_mm)
+        angle = np.radians(azimuth_deg)
+        return np.asarray(second * np.cos(angle) - first * np.sin(angle))
+
+    def crossings_mm(self, points_mm: FloatArray, velocities_m_s: FloatArray) -> FloatArray:
+        """Where lines along velocities cross the plane of the nozzle, from it, (N, 2); those beside the axis at it."""
+        along_mm, *across_mm = self.frame @ (points_mm - np.array(self.nozzle_mm)).T
+        forwards, *aside = self.frame @ (velocities_m_s / np.linalg.norm(velocities_m_s, axis=1, keepdims=True)).T
+        beside = forwards < LEAST_FORWARDS
+        way_mm = along_mm / np.where(beside, 1.0, forwards)
+        crossed_mm = np.column_stack([at - way_mm * way for at, way in zip(across_mm, aside, strict=True)])
+        return np.where(beside[:, None], 0.0, crossed_mm)
 
     def reach_mm(self, box_mm: FloatArray) -> tuple[float, float]:
         """From where to where a box reaches along the axis; not before the nozzle."""

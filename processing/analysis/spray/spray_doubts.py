@@ -14,31 +14,26 @@ from processing.analysis.few_together import few_together
 from processing.analysis.lingering_droplets import lingering_told
 from processing.analysis.near_or_far import depth_doubts
 from processing.analysis.shot_doubts import exposure_doubts, velocity_doubts
+from processing.analysis.spray.axis_doubts import LEAST_TOGETHER, axis_doubts
+from processing.analysis.spray.proposed_axis import ProposedAxis
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_motion import FEWEST, all_alike
 from processing.analysis.spray.spray_sample import SpraySample
+from processing.analysis.spray.steadiness import changes_of_spray
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
-from processing.geometry import FloatArray
 
 NO_CONDITIONS = ("operator", "remark", "more")
 """Of the notes, what may differ in one spray; what is in ``more`` is looked at by its own names."""
 NOT_STATED = "not stated"
 MOST_ASIDE_DEG = 45.0
 """Of the mean velocity from the axis; a spray flies along its axis, however wide it is."""
-MOST_BEHIND = 0.05
-"""Of the droplets; some are carried back."""
-FARTHEST_MM = 2000.0
-"""From the nozzle: no spray that is measured droplet by droplet is as long."""
-MOST_OFF_WAY_DEG = 15.0
-"""Of the mean flight from the mean way that leads from the nozzle to the droplets; single ones may fly anywhere."""
-MOST_ON_ONE_SIDE = 0.98
-"""Of the droplets, of an axis around which the box reaches."""
-LEAST_TOGETHER = 0.3
-"""Amount of the mean velocity over the mean speed: droplets that fly in all directions have none."""
 
 
 def spray_doubts(
-    shots: Sequence[StoredDroplets], sample: SpraySample | None, axis: SprayAxis | None
+    shots: Sequence[StoredDroplets],
+    sample: SpraySample | None = None,
+    axis: SprayAxis | None = None,
+    proposed: ProposedAxis | None = None,
 ) -> tuple[str, ...]:
     """What is doubtful, and what to do.
 
@@ -50,7 +45,10 @@ def spray_doubts(
         Their droplets; None where they have no diameters.
     axis : SprayAxis | None
         As stated.
+    proposed : ProposedAxis | None
+        What the droplets say of it.
     """
+    seen = axis or (proposed.believed if proposed else None)
     return (
         *exposure_doubts(shots),
         *few_together(shots),
@@ -60,8 +58,9 @@ def spray_doubts(
         *depth_doubts(shots),
         *_of_conditions(shots),
         *(_of_equals(sample) if sample else ()),
+        *(changes_of_spray(sample, seen) if sample and len(sample) else ()),
         *(_of_motion(sample, axis) if sample else ()),
-        *(_of_nozzle(sample, axis) if sample and axis and len(sample) else ()),
+        *(axis_doubts(sample, axis, proposed) if sample and axis and len(sample) else ()),
     )
 
 
@@ -79,67 +78,6 @@ def _of_conditions(shots: Sequence[StoredDroplets]) -> Iterator[str]:
     for name, values in noted(shots).items():
         if values != alike.get(name, NOT_STATED):
             yield f"shots differ in {name}: {values}; they are no one spray"
-
-
-def _of_nozzle(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:
-    """What contradicts its place."""
-    along_mm, from_mm, azimuth_deg = axis.coordinates(sample.points_mm)
-    if (share := float(np.mean(along_mm < 0))) > MOST_BEHIND:
-        yield f"{100 * share:.0f} % of the droplets lie behind the nozzle: is it stated rightly, and the axis?"
-        return
-    if (away_mm := float(np.median(along_mm))) > FARTHEST_MM:
-        yield f"the nozzle is stated {away_mm:.3g} mm from the droplets: is its place in mm? Angles are seen from there"
-        return
-    if (off_way_deg := _off_way_deg(sample, axis)) > MOST_OFF_WAY_DEG:
-        yield (
-            f"droplets fly {off_way_deg:.0f} degrees aside of the way from the nozzle, in the mean: is its place "
-            "stated rightly? Figures across the axis are of another place"
-        )
-    elif sample.box_mm is not None and np.percentile(from_mm, 5) > np.linalg.norm(np.ptp(sample.box_mm, axis=0)):
-        yield (
-            f"the axis passes {np.percentile(from_mm, 5):.2g} mm beside the droplets, farther than the box is wide: is "
-            "the place of the nozzle stated rightly?"
-        )
-    elif sample.box_mm is not None and _on_one_side(from_mm, azimuth_deg, _inside_mm(axis, sample.box_mm)):
-        yield (
-            f"the droplets lie on one side of the axis, {np.median(from_mm):.2g} mm from it, and the box reaches "
-            "around it: is the place of the nozzle stated rightly?"
-        )
-
-
-def _off_way_deg(sample: SpraySample, axis: SprayAxis) -> float:
-    """Angle between the mean direction of flight and the mean way from the nozzle; 0 where nothing flies together."""
-    paired = sample.paired
-    velocities, ways = sample.velocities_m_s[paired], sample.points_mm[paired] - np.array(axis.nozzle_mm)
-    speeds, lengths = np.linalg.norm(velocities, axis=1), np.linalg.norm(ways, axis=1)
-    moving = (speeds > 0) & (lengths > 0)
-    if not moving.any():
-        return 0.0
-    flight = (velocities[moving] / speeds[moving, None]).mean(axis=0)
-    way = (ways[moving] / lengths[moving, None]).mean(axis=0)
-    together = np.linalg.norm(flight)
-    if together <= LEAST_TOGETHER or (way @ flight) <= 0:  # that it flies another way is told of the axis
-        return 0.0
-    return float(np.degrees(np.arccos(np.clip(flight @ way / (together * np.linalg.norm(way)), -1, 1))))
-
-
-def _inside_mm(axis: SprayAxis, box_mm: FloatArray) -> float:
-    """How far around the axis a box reaches, where it reaches farthest; 0 where the axis does not pass through it."""
-    along_mm = np.linspace(*axis.reach_mm(box_mm), 200)
-    places_mm = np.array(axis.nozzle_mm) + along_mm[:, None] * axis.frame[0]
-    across = np.abs(axis.frame[0]) < np.sqrt(0.5)  # the axis leaves the box by the other faces
-    depth_mm = np.minimum(places_mm - box_mm[0], box_mm[1] - places_mm)
-    inside = (depth_mm >= 0).all(axis=1)
-    return float(depth_mm[inside][:, across].min(axis=1).max()) if inside.any() else 0.0
-
-
-def _on_one_side(from_mm: FloatArray, azimuth_deg: FloatArray, around_mm: float) -> bool:
-    """Whether the droplets lie beside an axis, nearer to it than the box reaches on their other side."""
-    angle = np.radians(azimuth_deg)
-    unit = np.column_stack([np.cos(angle), np.sin(angle)])
-    side = unit @ unit.mean(axis=0) > 0
-    width_mm = float(np.sqrt((from_mm[:, None] * unit).var(axis=0).sum()))
-    return float(np.mean(side)) > MOST_ON_ONE_SIDE and float(np.percentile(from_mm, 5)) > width_mm < 3 * around_mm
 
 
 def _of_equals(sample: SpraySample) -> Iterator[str]:

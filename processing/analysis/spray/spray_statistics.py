@@ -128,19 +128,21 @@ def spray_statistics(shots: Iterable[StoredDroplets], asked: AskedFor | None = N
     if not pooled.n or any(DIAMETER not in shot.columns for shot in shots):
         why = pooled.reason or "no droplet was measured"
         reasons = dict.fromkeys(("sample", "fits", "motion", "extent"), why)
-        doubts = spray_doubts(shots, None, asked.axis)
+        doubts = spray_doubts(shots)
         return SprayStatistics(droplets=pooled, reasons=reasons, doubts=doubts, detection_reason=why)
     sample = spray_sample(shots)
-    told = _of_sample(sample, pooled, asked)
-    ghosts, doubts = velocity_statistics(shots).unpaired_ghost_share, spray_doubts(shots, sample, asked.axis)
+    proposed = proposed_axis(sample)
+    told = _of_sample(sample, pooled, asked, None if asked.axis else proposed)
+    ghosts, doubts = velocity_statistics(shots).unpaired_ghost_share, spray_doubts(shots, sample, asked.axis, proposed)
     found = detection(shots, told.classes, sample.exposures_per_shot)
     update = {"detection": found, "detection_reason": NO_TWINS if found is None else None}
     return told.model_copy(update={"doubts": doubts, "unpaired_ghost_share": ghosts, **update})
 
 
-def _of_sample(sample: SpraySample, pooled: DropletStatistics, asked: AskedFor) -> SprayStatistics:
+def _of_sample(
+    sample: SpraySample, pooled: DropletStatistics, asked: AskedFor, proposed: ProposedAxis | None
+) -> SprayStatistics:
     extent, patternations = _in_space(sample, asked)
-    proposed = proposed_axis(sample) if asked.axis is None else None
     fits, motion = size_fits(sample), spray_motion(sample, asked.axis, asked.liquid_kg_m3)
     return SprayStatistics(
         droplets=pooled,

@@ -1,0 +1,203 @@
+"""What contradicts nozzle and axis as somebody has stated them: where droplets are, and how they fly."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.analysis.estimates import Figures
+from processing.analysis.spray.cone_tilt import tilt_addends, tilts_deg
+from processing.analysis.spray.proposed_axis import ProposedAxis
+from processing.analysis.spray.spray_axis import SprayAxis
+from processing.analysis.spray.spray_sample import SpraySample
+from processing.geometry import FloatArray
+
+MOST_BEHIND = 0.05
+"""Of the droplets; some are carried back."""
+FARTHEST_MM = 2000.0
+"""From the nozzle: no spray that is measured droplet by droplet is as long."""
+MOST_OFF_WAY_DEG = 15.0
+"""Of the mean flight from the mean way that leads from the nozzle to the droplets; single ones may fly anywhere."""
+MOST_ON_ONE_SIDE = 0.98
+"""Of the droplets, of an axis around which the box reaches."""
+LEAST_TOGETHER = 0.3
+"""Amount of the mean velocity over the mean speed: droplets that fly in all directions have none."""
+FEWEST = 100
+"""Droplets, to say that the axis leans."""
+MOST_LEAN_DEG, SURE = 1.5, 0.99
+"""Of the middle of the cone from the axis: a cone of 23 degrees becomes one of 26."""
+MOST_NEARER = 0.1
+"""Of the distance from the nozzle to the droplets: so much nearer or farther it may be; angles change as much."""
+SURER = 1.5
+"""Times the interval of a proposal, which has 95 %."""
+MOST_LONGER, TWO_HEAPED = 2.0, 1.6
+"""Of where droplets come from: length over width, and the kurtosis of its length: two places have 1, three 1.5, a slit
+1.8, and one place with scatter 3."""
+RING = 16
+"""Places around the axis that must all be in the box."""
+WIDE = 0.75
+"""Spread of directions over their distance from the axis, of a cone that is around the axis."""
+
+
+def axis_doubts(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | None) -> tuple[str, ...]:
+    """Say what contradicts a stated axis.
+
+    Parameters
+    ----------
+    sample : SpraySample
+        The droplets, one at least.
+    axis : SprayAxis
+        As stated.
+    proposed : ProposedAxis | None
+        What the droplets say by themselves.
+    """
+    coarse = tuple(_of_places(sample, axis))
+    if coarse:
+        return coarse
+    return (*_of_lean(sample, axis, proposed), *_of_meeting(sample, axis, proposed), *_of_two_places(sample, axis))
+
+
+def _of_lean(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | None) -> Iterator[str]:
+    """Whether the middle of the spray is beside the axis: of its flight, or of where it is as the nozzle sees it."""
+    held = sample.chosen(_held_all_around(sample, axis))
+    flying = held.chosen(held.paired & (np.abs(held.velocities_m_s) > 0).any(axis=1))
+    said = f": {proposed.words}" if proposed else ""
+    remedy = f"State both with --nozzle and --axis, or in the run's notes{said}"
+    if lean := _lean_told(flying, flying.velocities_m_s, axis):
+        yield f"droplets fly around an axis that is {lean} beside the stated one, {_numbers(axis.direction)}. {remedy}"
+    elif lean := _lean_told(held, held.points_mm - np.array(axis.nozzle_mm), axis):
+        yield (
+            f"droplets lie {lean} beside the axis, seen from the stated nozzle, {_numbers(axis.nozzle_mm)} mm: is its "
+            f"place stated rightly, and the axis? {remedy}"
+        )
+
+
+def _lean_told(sample: SpraySample, ways: FloatArray, axis: SprayAxis) -> str:
+    """By how much, with its interval; nothing where that is little, or may be chance."""
+    if len(sample) < FEWEST:
+        return ""
+    addends = tilt_addends(axis, ways)
+    away_deg = addends[:, 7:9].mean(axis=0)
+    beside = addends[:, 7:9].std(axis=0).max() < WIDE * np.linalg.norm(away_deg)
+
+    def lean_of(drawn: SpraySample) -> Figures:
+        sums = drawn.totals(addends)
+        return lambda counts: (
+            sums(counts)[:, 7:9] / np.maximum(sums(counts)[:, :1], 1) if beside else tilts_deg(sums(counts))
+        )
+
+    told = [one for one in sample.estimated(lean_of, signed=True, confidence=SURE) if one]
+    lean_deg = float(np.linalg.norm([one.value for one in told]))
+    within_deg = float(np.linalg.norm([(one.high - one.low) / 2 for one in told]))
+    if len(told) < 2 or lean_deg <= max(MOST_LEAN_DEG, within_deg):
+        return ""
+    return f"{lean_deg:.1f} degrees (99 %: within {within_deg:.1f})"
+
+
+def _held_all_around(sample: SpraySample, axis: SprayAxis) -> NDArray[np.bool_]:
+    """Droplets that a box would hold at every azimuth: those of a spray around the axis have their middle on it."""
+    if sample.box_mm is None:
+        return np.ones(len(sample), np.bool_)
+    along_mm, from_mm, _ = axis.coordinates(sample.points_mm)
+    held = along_mm > 0
+    for angle in 2 * np.pi * np.arange(RING) / RING:
+        across = np.cos(angle) * axis.frame[1] + np.sin(angle) * axis.frame[2]
+        places_mm = axis.nozzle_mm + along_mm[:, None] * axis.frame[0] + from_mm[:, None] * across
+        held &= ((places_mm >= sample.box_mm[0]) & (places_mm <= sample.box_mm[1])).all(axis=1)
+    return np.asarray(held)
+
+
+def _of_meeting(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | None) -> Iterator[str]:
+    """Whether droplets fly away from another place."""
+    if proposed is None or proposed.nozzle_mm is None:
+        return
+    place_mm = np.array([one.value for one in proposed.nozzle_mm])
+    unsure_mm = np.array([(one.high - one.low) / 2 for one in proposed.nozzle_mm])
+    far_mm = abs(float(axis.frame[0] @ (sample.points_mm.mean(axis=0) - place_mm)))
+    off_mm = axis.frame @ (place_mm - np.array(axis.nozzle_mm))
+    least_mm = far_mm * np.array([MOST_NEARER, *[np.tan(np.radians(MOST_LEAN_DEG))] * 2])
+    if (np.abs(off_mm) > least_mm + SURER * np.abs(axis.frame) @ unsure_mm).any():
+        yield (
+            f"the lines along which droplets fly meet {np.linalg.norm(off_mm):.2g} mm from the stated nozzle, "
+            f"{_numbers(axis.nozzle_mm)} mm: is its place stated rightly? Angles are seen from there; {proposed.words}"
+        )
+
+
+def _of_two_places(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:
+    """Whether droplets come from two nozzles or more in a row, and next to none from between them."""
+    flying = sample.chosen(sample.paired & (np.abs(sample.velocities_m_s) > 0).any(axis=1))
+    if len(flying) < FEWEST:
+        return
+    crossed_mm = axis.crossings_mm(flying.points_mm, flying.velocities_m_s)
+    (across_mm2, along_mm2), directions = np.linalg.eigh(np.cov(crossed_mm.T))
+    row_mm = (crossed_mm - crossed_mm.mean(axis=0)) @ directions[:, 1]
+    if along_mm2 > MOST_LONGER**2 * across_mm2 and np.mean(row_mm**4) < TWO_HEAPED * along_mm2**2:
+        yield (
+            f"droplets come from places {2 * np.sqrt(along_mm2):.2g} mm apart, on both sides of the stated nozzle: are "
+            "they of two sprays? Angles and shares are of none of them; measure a box around each"
+        )
+
+
+def _numbers(values: tuple[float, float, float]) -> str:
+    return ",".join(f"{one:.3g}" for one in values)
+
+
+def _of_places(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:
+    """What contradicts the place of the nozzle."""
+    along_mm, from_mm, azimuth_deg = axis.coordinates(sample.points_mm)
+    if (share := float(np.mean(along_mm < 0))) > MOST_BEHIND:
+        yield f"{100 * share:.0f} % of the droplets lie behind the nozzle: is it stated rightly, and the axis?"
+        return
+    if (away_mm := float(np.median(along_mm))) > FARTHEST_MM:
+        yield f"the nozzle is stated {away_mm:.3g} mm from the droplets: is its place in mm? Angles are seen from there"
+        return
+    if (off_way_deg := _off_way_deg(sample, axis)) > MOST_OFF_WAY_DEG:
+        yield (
+            f"droplets fly {off_way_deg:.0f} degrees aside of the way from the nozzle, in the mean: is its place "
+            "stated rightly? Figures across the axis are of another place"
+        )
+    elif sample.box_mm is not None and np.percentile(from_mm, 5) > np.linalg.norm(np.ptp(sample.box_mm, axis=0)):
+        yield (
+            f"the axis passes {np.percentile(from_mm, 5):.2g} mm beside the droplets, farther than the box is wide: is "
+            "the place of the nozzle stated rightly?"
+        )
+    elif sample.box_mm is not None and _on_one_side(from_mm, azimuth_deg, _inside_mm(axis, sample.box_mm)):
+        yield (
+            f"the droplets lie on one side of the axis, {np.median(from_mm):.2g} mm from it, and the box reaches "
+            "around it: is the place of the nozzle stated rightly?"
+        )
+
+
+def _off_way_deg(sample: SpraySample, axis: SprayAxis) -> float:
+    """Angle between the mean direction of flight and the mean way from the nozzle; 0 where nothing flies together."""
+    paired = sample.paired
+    velocities, ways = sample.velocities_m_s[paired], sample.points_mm[paired] - np.array(axis.nozzle_mm)
+    speeds, lengths = np.linalg.norm(velocities, axis=1), np.linalg.norm(ways, axis=1)
+    moving = (speeds > 0) & (lengths > 0)
+    if not moving.any():
+        return 0.0
+    flight = (velocities[moving] / speeds[moving, None]).mean(axis=0)
+    way = (ways[moving] / lengths[moving, None]).mean(axis=0)
+    together = np.linalg.norm(flight)
+    if together <= LEAST_TOGETHER or (way @ flight) <= 0:  # that it flies another way is told of the axis
+        return 0.0
+    return float(np.degrees(np.arccos(np.clip(flight @ way / (together * np.linalg.norm(way)), -1, 1))))
+
+
+def _inside_mm(axis: SprayAxis, box_mm: FloatArray) -> float:
+    """How far around the axis a box reaches, where it reaches farthest; 0 where the axis does not pass through it."""
+    along_mm = np.linspace(*axis.reach_mm(box_mm), 200)
+    places_mm = np.array(axis.nozzle_mm) + along_mm[:, None] * axis.frame[0]
+    across = np.abs(axis.frame[0]) < np.sqrt(0.5)  # the axis leaves the box by the other faces
+    depth_mm = np.minimum(places_mm - box_mm[0], box_mm[1] - places_mm)
+    inside = (depth_mm >= 0).all(axis=1)
+    return float(depth_mm[inside][:, across].min(axis=1).max()) if inside.any() else 0.0
+
+
+def _on_one_side(from_mm: FloatArray, azimuth_deg: FloatArray, around_mm: float) -> bool:
+    """Whether the droplets lie beside an axis, nearer to it than the box reaches on their other side."""
+    angle = np.radians(azimuth_deg)
+    unit = np.column_stack([np.cos(angle), np.sin(angle)])
+    side = unit @ unit.mean(axis=0) > 0
+    width_mm = float(np.sqrt((from_mm[:, None] * unit).var(axis=0).sum()))
+    return float(np.mean(side)) > MOST_ON_ONE_SIDE and float(np.percentile(from_mm, 5)) > width_mm < 3 * around_mm
