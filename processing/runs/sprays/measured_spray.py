@@ -1,7 +1,7 @@
 """MeasuredSpray: the droplets of some shots that were measured alike, and what their files say of nozzle and axis."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -148,10 +148,13 @@ class ComparedSprays:
         A folder each.
     unlike : tuple of str
         What was measured differently: a difference of two may be of the measurement; and what is the same shots.
+    conditions : tuple of str
+        What is not the same of the sprays themselves, as people have noted: what one compares.
     """
 
     sprays: dict[str, MeasuredSpray]
     unlike: tuple[str, ...]
+    conditions: tuple[str, ...] = ()
 
 
 def read_compared(folders: Sequence[Path]) -> ComparedSprays:
@@ -168,9 +171,9 @@ def read_compared(folders: Sequence[Path]) -> ComparedSprays:
         raise DropletFileError(
             f"{', '.join(map(str, folders))}: to compare takes two directories at least, of different names"
         )
-    first, *others = sprays
-    unlike = [f"{other.name} and {first.name} differ in {what}" for other in others if (what := _unlike(first, other))]
-    return ComparedSprays(named, (*unlike, *_elsewhere(sprays), *_shared(sprays), *_lingering(sprays)))
+    unlike = _differing(sprays, lambda one: {**_made_by(one.provenance), **_separation(one.shots)}, "differ in {}")
+    conditions = _differing(sprays, lambda one: noted(one.shots), "are sprays of other conditions: {}")
+    return ComparedSprays(named, (*unlike, *_elsewhere(sprays), *_shared(sprays), *_lingering(sprays)), conditions)
 
 
 def _elsewhere(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
@@ -196,8 +199,16 @@ def _lingering(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
         yield from (f"{spray.name}: {told}" for told in lingering_told(spray.shots))
 
 
-def _unlike(first: MeasuredSpray, other: MeasuredSpray) -> str:
-    its, others = ({**_made_by(spray.provenance), **_stated(spray.shots)} for spray in (other, first))
+def _differing(
+    sprays: Sequence[MeasuredSpray], said_of: Callable[[MeasuredSpray], Mapping[str, object]], text: str
+) -> tuple[str, ...]:
+    """In what each of the others differs from the first."""
+    first, *others = ((spray.name, said_of(spray)) for spray in sprays)
+    told = ((name, _differences(its, first[1])) for name, its in others)
+    return tuple(f"{name} and {first[0]} {text.format(what)}" for name, what in told if what)
+
+
+def _differences(its: Mapping[str, object], others: Mapping[str, object]) -> str:
     return "; ".join(
         f"{name}: {its.get(name, NOT_STATED)} and {others.get(name, NOT_STATED)}"
         for name in {**its, **others}
@@ -212,9 +223,9 @@ def _made_by(provenance: Mapping[str, Any]) -> dict[str, object]:
     return {**{name: provenance.get(name) for name in names}, **settings}
 
 
-def _stated(shots: Sequence[StoredDroplets]) -> dict[str, object]:
-    """What people say of a spray, and how far apart its exposures are."""
+def _separation(shots: Sequence[StoredDroplets]) -> dict[str, object]:
+    """How far apart their exposures are, and who says so."""
     velocities = [json.loads(str(shot.provenance.get("velocity", "{}"))) or {} for shot in shots]
     known = [(one["separation_ns"] / 1000, one["separation_source"]) for one in velocities if "separation_ns" in one]
     apart = dict.fromkeys(f"{us:.4g} us as {source}" for us, source in known)
-    return {**noted(shots), **({"separation": " and ".join(apart)} if apart else {})}
+    return {"separation": " and ".join(apart)} if apart else {}

@@ -56,12 +56,14 @@ def _compare(options: Namespace) -> Outcome:
     found = differences(told)
     result = {
         "runs": {name: one.model_dump(mode="json") for name, one in told.items()},
+        "conditions_differ": list(sprays.conditions),
         "measured_differently": list(sprays.unlike),
         "conditions_changed": [change for spray in sprays.sprays.values() for change in spray.changes],
         "differences": [one.model_dump(mode="json") for one in found],
         "reason": None if found else NOTHING,
     }
-    texts = [*(_text(spray, told[name]) for name, spray in sprays.sprays.items()), *sprays.unlike]
+    differing = [*sprays.conditions, *(f"measured differently: {one}" for one in sprays.unlike)]
+    texts = [*(_text(spray, told[name]) for name, spray in sprays.sprays.items()), *differing]
     return Outcome(result, "\n\n".join([*texts, _differences(found) if found else NOTHING]))
 
 

@@ -82,14 +82,15 @@ def test_what_operators_state_of_sprays_that_are_compared_is_told(tmp_path: Path
         )
         for number, name in enumerate(("one", "two", "like"))
     ]
-    assert read_compared([results[0], results[2]]).unlike == ()
-    assert read_compared(results[:2]).unlike == (
-        "two and one differ in fluid: ethanol and water; nozzle: A5 and A4; "
-        "separation: 3.2 us as stated and 6.4 us as stated",
+    alike, other = read_compared([results[0], results[2]]), read_compared(results[:2])
+    assert (alike.conditions, alike.unlike) == ((), ())
+    assert other.conditions == (
+        "two and one are sprays of other conditions: fluid: ethanol and water; nozzle: A5 and A4",
     )
+    assert other.unlike == ("two and one differ in separation: 3.2 us as stated and 6.4 us as stated",)
     mute = write_results(tmp_path / "mute", cone_shots(3, 2, 20), run="mute")
-    (told,) = read_compared([results[0], mute]).unlike
-    assert told.startswith("mute and one differ in fluid: not stated and water; ")
+    (told,) = read_compared([results[0], mute]).conditions
+    assert told.startswith("mute and one are sprays of other conditions: fluid: not stated and water; ")
 
 
 def test_nozzles_at_two_places_are_told_where_sprays_are_compared(tmp_path: Path) -> None:

@@ -107,6 +107,21 @@ def test_a_comparison_finds_what_differs_and_says_what_was_measured_differently(
     assert any("number density [1/mm³]" in line and "differs" in line for line in compared_by_name)
 
 
+def test_other_pressures_are_a_difference_of_the_sprays_not_of_the_measurement(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    low, high = (
+        write_results(tmp_path / name, cone_shots(seed, 2, 30), run=name, notes=json.dumps({"pressure_bar": bar}))
+        for seed, name, bar in ((1, "low", 6.0), (2, "high", 20.0))
+    )
+    compared = told(capsys, "statistics", low, high, "--compare")
+    assert compared["measured_differently"] == []
+    assert compared["conditions_differ"] == ["high and low are sprays of other conditions: pressure_bar: 20.0 and 6.0"]
+    text = shown(capsys, "statistics", low, high, results / "monday", "--compare")
+    assert "high and low are sprays of other conditions: pressure_bar: 20.0 and 6.0" in text
+    assert "measured differently" not in text
+
+
 def test_what_is_missing_for_one_reason_is_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     nowhere = write_results(tmp_path / "nowhere", cone_shots(0, 2, 60))
     (line,) = [line for line in shown(capsys, "statistics", nowhere).splitlines() if "nozzle and axis" in line]
