@@ -97,7 +97,7 @@ def _lean_told(sample: SpraySample, ways: FloatArray, axis: SprayAxis) -> str:
 def _held_all_around(sample: SpraySample, axis: SprayAxis) -> NDArray[np.bool_]:
     """Droplets that a box would hold at every azimuth: those of a spray around the axis have their middle on it."""
     if sample.box_mm is None:
-        return np.ones(len(sample), np.bool_)
+        return np.zeros(len(sample), np.bool_)  # nobody knows what a box cuts off
     along_mm, from_mm, _ = axis.coordinates(sample.points_mm)
     held = along_mm > 0
     for angle in 2 * np.pi * np.arange(RING) / RING:

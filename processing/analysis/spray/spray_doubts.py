@@ -10,6 +10,7 @@ import numpy as np
 
 from processing.analysis.copied_shots import copies_told
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.droplet_statistics import measured_grid
 from processing.analysis.few_together import few_together
 from processing.analysis.lingering_droplets import lingering_told
 from processing.analysis.near_or_far import depth_doubts
@@ -18,13 +19,15 @@ from processing.analysis.spray.axis_doubts import LEAST_TOGETHER, axis_doubts
 from processing.analysis.spray.proposed_axis import ProposedAxis
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_motion import FEWEST, all_alike
-from processing.analysis.spray.spray_sample import SpraySample
+from processing.analysis.spray.spray_sample import SpraySample, box_told
 from processing.analysis.spray.steadiness import changes_of_spray
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
 
 NO_CONDITIONS = ("operator", "remark", "more")
 """Of the notes, what may differ in one spray; what is in ``more`` is looked at by its own names."""
 NOT_STATED = "not stated"
+LIGHTEST_KG_M3, PA_PER_BAR = 600.0, 1e5
+"""Of what is liquid at room temperature: it leaves a nozzle the fastest."""
 MOST_ASIDE_DEG = 45.0
 """Of the mean velocity from the axis; a spray flies along its axis, however wide it is."""
 
@@ -57,9 +60,11 @@ def spray_doubts(
         *lingering_told(shots),
         *depth_doubts(shots),
         *_of_conditions(shots),
+        *_of_boxes(shots),
         *(_of_equals(sample) if sample else ()),
         *(changes_of_spray(sample, seen) if sample and len(sample) else ()),
         *(_of_motion(sample, axis) if sample else ()),
+        *(_of_pressure(shots, sample) if sample else ()),
         *(axis_doubts(sample, axis, proposed) if sample and axis and len(sample) else ()),
     )
 
@@ -78,6 +83,16 @@ def _of_conditions(shots: Sequence[StoredDroplets]) -> Iterator[str]:
     for name, values in noted(shots).items():
         if values != alike.get(name, NOT_STATED):
             yield f"shots differ in {name}: {values}; they are no one spray"
+
+
+def _of_boxes(shots: Sequence[StoredDroplets]) -> Iterator[str]:
+    """Where shots were measured, if not in one box."""
+    boxes = list(dict.fromkeys(box_told(grid) for shot in shots if (grid := measured_grid(shot))))
+    if len(boxes) > 1:
+        yield (
+            f"shots were measured in {len(boxes)} boxes ({boxes[0]}; {boxes[1]}): densities, flux and sizes are means "
+            "over both places; measure all of them in one"
+        )
 
 
 def _of_equals(sample: SpraySample) -> Iterator[str]:
@@ -106,4 +121,19 @@ def _of_motion(sample: SpraySample, axis: SprayAxis | None) -> Iterator[str]:
         yield (
             f"droplets fly {aside_deg:.0f} degrees from the axis, in the mean: is it stated rightly, and are exposures "
             "A and B exchanged? Figures along the axis are of another direction"
+        )
+
+
+def _of_pressure(shots: Sequence[StoredDroplets], sample: SpraySample) -> Iterator[str]:
+    """Whether droplets fly faster than the pressure that is noted makes any liquid leave a nozzle (Bernoulli)."""
+    notes = [json.loads(str(shot.provenance.get("notes", "{}"))) for shot in shots]
+    stated_bar = [one.get("pressure_bar") for one in notes]
+    speeds_m_s = np.linalg.norm(sample.velocities_m_s[sample.paired], axis=1)
+    if None in stated_bar or not max(stated_bar, default=0) or len(speeds_m_s) < FEWEST:
+        return
+    fastest_m_s = np.sqrt(2 * PA_PER_BAR * max(stated_bar) / LIGHTEST_KG_M3)
+    if (speed_m_s := float(np.median(speeds_m_s))) > fastest_m_s:
+        yield (
+            f"droplets fly at {speed_m_s:.3g} m/s, but {max(stated_bar):g} bar make no liquid faster than "
+            f"{fastest_m_s:.3g} m/s, if no gas drives it: is the separation stated rightly, in ns, and the pressure?"
         )

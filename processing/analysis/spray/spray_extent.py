@@ -3,8 +3,9 @@
 * *Cone angle*: twice the angle from the axis, seen from the nozzle, within which a share of the liquid of the box is:
   90 %, and 50 %, which in a hollow cone is where the cone is. Spatial: by what is there, not by what flows.
 * *Penetration*: the distance from the nozzle along the axis beyond which 1 % of the liquid of the box is. It is known
-  where the box holds the tip: where its last tenth has less than a tenth of the mean of the rest. Of a spray that goes
-  on beyond the box there is none.
+  where the box holds the tip: where its last tenth has less than a tenth of the mean of the rest, and nine tenths of
+  the liquid before the tip would still be in the box a tenth farther from the nozzle. Of a spray that goes on beyond
+  the box, or leaves it by its sides, there is none.
 """
 
 from typing import Annotated
@@ -25,8 +26,12 @@ LEAST_COVERED = 0.9
 EDGE = 0.1
 """Of the angle, to both sides: so wide is that ring; of the box's length: its last part."""
 FEWEST = 20
-TOO_NARROW = "the box does not reach around the cone: it cuts off what flies farther out; measure a wider box"
+TOO_NARROW = (
+    "the box does not reach around the cone: it cuts off what flies farther out, and flux and densities are means over "
+    "what it holds; measure a wider box"
+)
 GOES_ON = "the spray goes on beyond the box: measure a longer box, or earlier after the start of injection"
+LEAVES = "the spray leaves the box by its sides before it ends: measure a wider box"
 TOO_FEW = f"fewer than {FEWEST} droplets beyond the nozzle"
 NO_BOX = "shots were measured in several boxes, or no file says in which: measure all of them in one"
 
@@ -64,13 +69,13 @@ def spray_extent(sample: SpraySample, axis: SprayAxis) -> SprayExtent:
     half, most = _quantiles(chosen, 2 * angles_deg, SHARES)
     wide_enough = most is None or _covered(axis, sample.box_mm, most.value / 2) >= LEAST_COVERED
     (tip,) = _quantiles(chosen, along_mm[along_mm > 0], (TIP_SHARE,))
-    ends = _ends(chosen.cubes_um3, along_mm[along_mm > 0], axis.reach_mm(sample.box_mm))
+    goes_on = _goes_on(chosen, axis, sample.box_mm, tip.value if tip else 0.0)
     return SprayExtent(
         cone_angle_deg=most if wide_enough else None,
         cone_angle_half_deg=half if wide_enough else None,
         cone_reason=None if wide_enough else TOO_NARROW,
-        penetration_mm=tip if ends else None,
-        penetration_reason=None if ends else GOES_ON,
+        penetration_mm=None if goes_on else tip,
+        penetration_reason=goes_on,
     )
 
 
@@ -95,7 +100,14 @@ def _covered(axis: SprayAxis, box_mm: FloatArray, angle_deg: float) -> float:
     return float(inside_mm3 / (np.pi * np.diff(edges_mm[1] ** 2)[0] * length_mm))
 
 
-def _ends(cubes_um3: FloatArray, along_mm: FloatArray, reach_mm: tuple[float, float]) -> bool:
-    """Whether the last part of the box has next to no liquid."""
-    last = along_mm > reach_mm[1] - EDGE * (reach_mm[1] - reach_mm[0])
-    return bool(cubes_um3[last].sum() < EDGE * EDGE / (1 - EDGE) * cubes_um3[~last].sum())
+def _goes_on(sample: SpraySample, axis: SprayAxis, box_mm: FloatArray, tip_mm: float) -> str | None:
+    """Why the tip is not known: the last part of the box has liquid, or what is before the tip is about to leave it."""
+    along_mm, _, _ = axis.coordinates(sample.points_mm)
+    near_mm, far_mm = axis.reach_mm(box_mm)
+    last, cubes = along_mm > far_mm - EDGE * (far_mm - near_mm), sample.cubes_um3
+    if cubes[last].sum() >= EDGE * EDGE / (1 - EDGE) * cubes[~last].sum():
+        return GOES_ON
+    farther_mm = np.array(axis.nozzle_mm) + (1 + EDGE) * (sample.points_mm - np.array(axis.nozzle_mm))
+    leaves = ((farther_mm < box_mm[0]) | (farther_mm > box_mm[1])).any(axis=1)
+    before = along_mm > (1 - EDGE) * tip_mm
+    return LEAVES if cubes[before & leaves].sum() > EDGE * cubes[before].sum() else None

@@ -208,3 +208,10 @@ def bounds_mm(grid: VoxelGrid) -> FloatArray:
     """Lower and upper corner of a grid, (2, 3): half a voxel beyond its outermost centres."""
     first, last = np.array([[axis[0], axis[-1]] for axis in (grid.x_mm, grid.y_mm, grid.z_mm)]).T
     return np.array([first - grid.pitch_mm / 2, last + grid.pitch_mm / 2])
+
+
+def box_told(grid: VoxelGrid) -> str:
+    """For people: where a grid reaches along x, y and z."""
+    ends_mm = (bounds_mm(grid).round(3) + 0.0).T.tolist()  # no zero has a sign
+    told = (f"{name} {low:g} to {high:g}" for name, (low, high) in zip("xyz", ends_mm, strict=True))
+    return f"{', '.join(told)} mm"

@@ -9,10 +9,11 @@ from typing import Any
 
 from processing.analysis.copied_shots import in_common
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
-from processing.analysis.droplets.droplet_statistics import require_poolable
+from processing.analysis.droplets.droplet_statistics import measured_grid, require_poolable
 from processing.analysis.lingering_droplets import lingering_told
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_doubts import NOT_STATED, noted
+from processing.analysis.spray.spray_sample import box_told
 from processing.runs.droplets_in_place import read_in_place
 from processing.runs.sprays.conditions import changes_told, spray_around
 
@@ -171,7 +172,9 @@ def read_compared(folders: Sequence[Path]) -> ComparedSprays:
         raise DropletFileError(
             f"{', '.join(map(str, folders))}: to compare takes two directories at least, of different names"
         )
-    unlike = _differing(sprays, lambda one: {**_made_by(one.provenance), **_separation(one.shots)}, "differ in {}")
+    unlike = _differing(
+        sprays, lambda one: {**_made_by(one.provenance), **_separation(one.shots), **_box(one.shots)}, "differ in {}"
+    )
     conditions = _differing(sprays, lambda one: noted(one.shots), "are sprays of other conditions: {}")
     return ComparedSprays(named, (*unlike, *_elsewhere(sprays), *_shared(sprays), *_lingering(sprays)), conditions)
 
@@ -220,6 +223,7 @@ def _made_by(provenance: Mapping[str, Any]) -> dict[str, object]:
     """What a measurement depends on."""
     names = ("calibration", "method_version")
     settings = json.loads(str(provenance.get("settings", "{}")))
+    settings.pop("grid", None)  # told as the box, wherever it comes from
     return {**{name: provenance.get(name) for name in names}, **settings}
 
 
@@ -229,3 +233,9 @@ def _separation(shots: Sequence[StoredDroplets]) -> dict[str, object]:
     known = [(one["separation_ns"] / 1000, one["separation_source"]) for one in velocities if "separation_ns" in one]
     apart = dict.fromkeys(f"{us:.4g} us as {source}" for us, source in known)
     return {"separation": " and ".join(apart)} if apart else {}
+
+
+def _box(shots: Sequence[StoredDroplets]) -> dict[str, object]:
+    """In which box they were measured: densities and flux are means over it."""
+    grids = dict.fromkeys(measured_grid(shot) for shot in shots)
+    return {"box": " and ".join("nobody knows which" if grid is None else box_told(grid) for grid in grids)}

@@ -175,3 +175,21 @@ def test_shots_of_different_conditions_are_told() -> None:
         "shots differ in flow_l_min: 1.2 and not stated; they are no one spray",
     ]
     assert not doubts(*(saying(shot, notes=notes) for shot in SHOTS))
+
+
+def test_droplets_faster_than_the_pressure_makes_them_are_told() -> None:
+    """A separation that was stated half as long makes 9 m/s 18; 0.5 bar make no more than 12.9."""
+    noted = [saying(shot, notes=json.dumps({"pressure_bar": 0.5})) for shot in SHOTS]
+    told = doubts(*(moved(shot, 2.0) for shot in noted))
+    assert "m/s, but 0.5 bar make no liquid faster than 12.9 m/s" in told
+    assert "is the separation stated rightly" in told
+    assert not doubts(*noted)
+    assert "bar make" not in doubts(*(moved(shot, 2.0) for shot in noted[:3]), moved(SHOTS[3], 2.0))
+
+
+def test_shots_of_two_boxes_are_told() -> None:
+    grid = json.loads(str(SHOTS[0].provenance["grid"]))
+    other = saying(SHOTS[0], grid=json.dumps({**grid, "shape": [100, 40, 120]}))
+    told = doubts(other, *SHOTS[1:])
+    assert "shots were measured in 2 boxes (x -5 to 7, y 8 to 12, z -5 to 5 mm; x -5 to 5, y 8" in told
+    assert "densities, flux and sizes are means over both places" in told

@@ -302,6 +302,23 @@ def test_a_spray_that_ends_in_the_box_has_a_penetration() -> None:
     assert value(extent.penetration_mm) == pytest.approx(10.97, abs=0.04)
 
 
+@pytest.mark.parametrize(("half_deg", "lean_deg"), [(4.0, 30.0), (22.0, 0.0)])
+def test_a_spray_that_leaves_the_box_by_its_sides_has_no_penetration(half_deg: float, lean_deg: float) -> None:
+    """A narrow one that leans, and a wide one: neither reaches the far end of the box, and both go on."""
+    rng, box, gone = np.random.default_rng(0), VoxelGrid((100, 120, 100), (-4.95, 8.05, -4.95), 0.1), []
+    lean = float(np.tan(np.radians(lean_deg)))
+    for shot in range(4):
+        along_mm, azimuth = rng.uniform(8, 20, 300), rng.uniform(0, 2 * np.pi, 300)
+        from_mm = along_mm * np.tan(np.radians(half_deg))
+        points_mm = np.column_stack([from_mm * np.cos(azimuth) + lean * along_mm, along_mm, from_mm * np.sin(azimuth)])
+        seen = points_mm[(np.abs(points_mm[:, [0, 2]]) < 5).all(axis=1)]
+        gone.append(stored_shot(rng.uniform(30, 50, len(seen)), seen, shot=shot, grid=box))
+    extent = spray_statistics(gone, AskedFor(SprayAxis((0, 0, 0), (lean, 1, 0)))).extent
+    assert extent
+    assert extent.penetration_mm is None
+    assert "leaves the box by its sides" in (extent.penetration_reason or "")
+
+
 def test_droplets_without_partner_take_the_mean_velocity_of_the_others(cone: list[StoredDroplets]) -> None:
     """Lost at random, a third of the velocities changes the flux by chance only."""
     rng = np.random.default_rng(2)

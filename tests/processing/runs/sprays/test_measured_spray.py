@@ -103,3 +103,14 @@ def test_nozzles_at_two_places_are_told_where_sprays_are_compared(tmp_path: Path
     (told,) = read_compared([one, two]).unlike
     assert "two and one differ in nozzle and axis" in told
     assert "(0, 2, 0) mm along (0, 1, 0)" in told
+
+
+def test_boxes_in_which_sprays_were_measured_are_told_where_they_are_compared(tmp_path: Path) -> None:
+    """Densities and flux are means over the box: of one spray they differ where boxes do."""
+    one = write_results(tmp_path / "one", cone_shots(0, 2, 20), run="one")
+    grid = json.loads(str(cone_shots(0, 1, 20)[0].provenance["grid"]))
+    smaller = json.dumps({**grid, "shape": [50, 40, 100]})
+    two = write_results(tmp_path / "two", cone_shots(1, 2, 20), run="two", grid=smaller)
+    assert read_compared([one, two]).unlike == (
+        "two and one differ in box: x -5 to 5, y 8 to 12, z -5 to 0 mm and x -5 to 5, y 8 to 12, z -5 to 5 mm",
+    )
