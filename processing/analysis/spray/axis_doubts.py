@@ -1,12 +1,11 @@
 """What contradicts nozzle and axis as somebody has stated them: where droplets are, and how they fly."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.estimates import Figures
-from processing.analysis.spray.cone_tilt import tilt_addends, tilts_deg
+from processing.analysis.spray.cone_tilt import MOST_LEAN_DEG, lean_of
 from processing.analysis.spray.proposed_axis import ProposedAxis
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
@@ -23,20 +22,16 @@ MOST_ON_ONE_SIDE = 0.98
 LEAST_TOGETHER = 0.3
 """Amount of the mean velocity over the mean speed: droplets that fly in all directions have none."""
 FEWEST = 100
-"""Droplets, to say that the axis leans."""
-MOST_LEAN_DEG, SURE = 1.5, 0.99
-"""Of the middle of the cone from the axis: a cone of 23 degrees becomes one of 26."""
+"""Droplets with a velocity, to say that they come from two places."""
 MOST_NEARER = 0.1
 """Of the distance from the nozzle to the droplets: so much nearer or farther it may be; angles change as much."""
 SURER = 1.5
-"""Times the interval of a proposal, which has 95 %."""
+"""Times the interval of a proposal, which has 95 %: 99 and more."""
 MOST_LONGER, TWO_HEAPED = 2.0, 1.6
 """Of where droplets come from: length over width, and the kurtosis of its length: two places have 1, three 1.5, a slit
 1.8, and one place with scatter 3."""
 RING = 16
 """Places around the axis that must all be in the box."""
-WIDE = 0.75
-"""Spread of directions over their distance from the axis, of a cone that is around the axis."""
 
 
 def axis_doubts(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | None) -> tuple[str, ...]:
@@ -54,7 +49,8 @@ def axis_doubts(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | N
     coarse = tuple(_of_places(sample, axis))
     if coarse:
         return coarse
-    return (*_of_lean(sample, axis, proposed), *_of_meeting(sample, axis, proposed), *_of_two_places(sample, axis))
+    told = (*_of_lean(sample, axis, proposed), *_of_meeting(sample, axis, proposed))
+    return told or tuple(_of_two_places(sample, axis))
 
 
 def _of_lean(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | None) -> Iterator[str]:
@@ -63,34 +59,26 @@ def _of_lean(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | None
     flying = held.chosen(held.paired & (np.abs(held.velocities_m_s) > 0).any(axis=1))
     said = f": {proposed.words}" if proposed else ""
     remedy = f"State both with --nozzle and --axis, or in the run's notes{said}"
-    if lean := _lean_told(flying, flying.velocities_m_s, axis):
-        yield f"droplets fly around an axis that is {lean} beside the stated one, {_numbers(axis.direction)}. {remedy}"
-    elif lean := _lean_told(held, held.points_mm - np.array(axis.nozzle_mm), axis):
+    if lean := lean_of(flying, flying.velocities_m_s, axis) or _from_proposed(axis, proposed):
+        stated = _numbers(axis.direction)
+        yield f"droplets fly around an axis that is {_told(*lean)} beside the stated one, {stated}. {remedy}"
+    elif lean := lean_of(held, held.points_mm - np.array(axis.nozzle_mm), axis):
         yield (
-            f"droplets lie {lean} beside the axis, seen from the stated nozzle, {_numbers(axis.nozzle_mm)} mm: is its "
-            f"place stated rightly, and the axis? {remedy}"
+            f"droplets lie {_told(*lean)} beside the axis, seen from the stated nozzle, {_numbers(axis.nozzle_mm)} mm: "
+            f"is its place stated rightly, and the axis? {remedy}"
         )
 
 
-def _lean_told(sample: SpraySample, ways: FloatArray, axis: SprayAxis) -> str:
-    """By how much, with its interval; nothing where that is little, or may be chance."""
-    if len(sample) < FEWEST:
-        return ""
-    addends = tilt_addends(axis, ways)
-    away_deg = addends[:, 7:9].mean(axis=0)
-    beside = addends[:, 7:9].std(axis=0).max() < WIDE * np.linalg.norm(away_deg)
+def _from_proposed(axis: SprayAxis, proposed: ProposedAxis | None) -> tuple[float, float] | None:
+    """How far a proposed axis is from the stated one; of a fan, which has no directions all around, only that tells."""
+    if proposed is None or proposed.axis is None or proposed.axis_within_deg is None:
+        return None
+    cosine = float(axis.frame[0] @ np.array(proposed.axis))
+    off_deg, within_deg = float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))), SURER * proposed.axis_within_deg
+    return (off_deg, within_deg) if off_deg > MOST_LEAN_DEG + within_deg else None
 
-    def lean_of(drawn: SpraySample) -> Figures:
-        sums = drawn.totals(addends)
-        return lambda counts: (
-            sums(counts)[:, 7:9] / np.maximum(sums(counts)[:, :1], 1) if beside else tilts_deg(sums(counts))
-        )
 
-    told = [one for one in sample.estimated(lean_of, signed=True, confidence=SURE) if one]
-    lean_deg = float(np.linalg.norm([one.value for one in told]))
-    within_deg = float(np.linalg.norm([(one.high - one.low) / 2 for one in told]))
-    if len(told) < 2 or lean_deg <= max(MOST_LEAN_DEG, within_deg):
-        return ""
+def _told(lean_deg: float, within_deg: float) -> str:
     return f"{lean_deg:.1f} degrees (99 %: within {within_deg:.1f})"
 
 
@@ -119,7 +107,8 @@ def _of_meeting(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | N
     if (np.abs(off_mm) > least_mm + SURER * np.abs(axis.frame) @ unsure_mm).any():
         yield (
             f"the lines along which droplets fly meet {np.linalg.norm(off_mm):.2g} mm from the stated nozzle, "
-            f"{_numbers(axis.nozzle_mm)} mm: is its place stated rightly? Angles are seen from there; {proposed.words}"
+            f"{_numbers(axis.nozzle_mm)} mm, at {_numbers(place_mm)}: is its place stated rightly? Angles are seen "
+            f"from there; {proposed.words}"
         )
 
 
@@ -138,8 +127,8 @@ def _of_two_places(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:
         )
 
 
-def _numbers(values: tuple[float, float, float]) -> str:
-    return ",".join(f"{one:.3g}" for one in values)
+def _numbers(values: Iterable[float]) -> str:
+    return ",".join(f"{round(one, 2) + 0.0:g}" for one in values)
 
 
 def _of_places(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:

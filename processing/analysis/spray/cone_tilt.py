@@ -7,8 +7,17 @@ The mean direction would be drawn to where most droplets are.
 
 import numpy as np
 
+from processing.analysis.estimates import Figures
 from processing.analysis.spray.spray_axis import SprayAxis
+from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
+
+FEWEST = 100
+"""Droplets, to say that a cone leans."""
+MOST_LEAN_DEG, SURE = 1.5, 0.99
+"""Of the middle of a cone from the axis: one of 23 degrees becomes one of 26."""
+WIDE = 0.75
+"""Spread of directions over their distance from the axis, of a cone that is around the axis."""
 
 
 def tilt_addends(axis: SprayAxis, ways: FloatArray) -> FloatArray:
@@ -27,3 +36,36 @@ def tilts_deg(sums: FloatArray) -> FloatArray:
     found = np.full((len(sums), 2), np.nan)
     found[known] = np.einsum("rij,rj->ri", np.linalg.pinv(matrices, hermitian=True), sums[known, 6:])[:, 1:]
     return found
+
+
+def lean_of(sample: SpraySample, ways: FloatArray, axis: SprayAxis) -> tuple[float, float] | None:
+    """By how many degrees a cone leans from an axis, and within how many with 99 %; None where it may be chance.
+
+    Parameters
+    ----------
+    sample : SpraySample
+        Droplets.
+    ways : (N, 3) array
+        Their directions, of any length.
+    axis : SprayAxis
+        Of which only the direction counts.
+    """
+    if len(sample) < FEWEST:
+        return None
+    addends = tilt_addends(axis, ways)
+    away_deg = addends[:, 7:9].mean(axis=0)
+    beside = addends[:, 7:9].std(axis=0).max() < WIDE * np.linalg.norm(away_deg)
+
+    def leans_of(drawn: SpraySample) -> Figures:
+        sums = drawn.totals(addends)
+        return lambda counts: _means_deg(sums(counts)) if beside else tilts_deg(sums(counts))
+
+    told = [one for one in sample.estimated(leans_of, signed=True, confidence=SURE) if one]
+    lean_deg = float(np.linalg.norm([one.value for one in told]))
+    within_deg = float(np.linalg.norm([(one.high - one.low) / 2 for one in told]))
+    return (lean_deg, within_deg) if len(told) == 2 and lean_deg > max(MOST_LEAN_DEG, within_deg) else None
+
+
+def _means_deg(sums: FloatArray) -> FloatArray:
+    """Of directions that are all to one side of the axis: tilts are where they are."""
+    return np.asarray(sums[:, 7:9] / np.maximum(sums[:, :1], 1))

@@ -1,15 +1,18 @@
 """Nozzle and axis that nobody stated, proposed from how droplets fly: away from the nozzle, around the axis.
 
 Lines along the velocities meet near the nozzle. Scatter of the velocities draws the point that is nearest to all of
-them towards the droplets; that is taken off. The axis is the mean direction, if the spray is alike on both sides of it.
+them towards the droplets; that is taken off. The axis is the mean direction where the box does not cut the spray, if it
+is alike on both sides of it.
 """
 
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from processing.analysis.estimates import Estimate, Figures
+from processing.analysis.spray.cone_tilt import lean_of
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
@@ -17,12 +20,19 @@ from processing.reconstruction.settings import FrozenValue
 
 FEWEST = 100
 """Droplets with a velocity."""
-MOST_UNLIKE = 0.2
-"""Half the sum of the differences between opposite sectors, over all droplets: chance and gusts have less."""
+MOST_UNLIKE, SURER = 0.2, 1.5
+"""Half the sum of the differences between opposite sectors, over all droplets: gusts have less, and chance of few makes
+the root of their number more; and times the interval of the mean direction, from which the middle of the cone may be.
+"""
+MOST_BEHIND = 0.05
+"""Of the droplets, behind a nozzle."""
 MOST_UNSURE = 0.5
 """Width of the interval of the nozzle along the axis, over its distance from the middle of the droplets."""
 MOST_SWIRL = 0.1
 """Of the mean radial direction, around the axis: more draws the nozzle farther than its interval says."""
+SLICES, WIDER, MOST_CUT = 8, 1.2, 0.02
+"""Across the axis, of equal numbers of droplets; those that would be outside the box if they were a fifth farther from
+the axis are at its sides, and a slice that has more of them is cut."""
 SECTORS, ROUNDS = 8, 3
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
@@ -66,6 +76,8 @@ NOT_ALIKE = (
 SWIRLS = (
     "droplets fly around the axis, too (a swirl), so lines along their velocities do not meet at the nozzle: state it"
 )
+AMID = "lines along the velocities meet amid the droplets: that is no nozzle; state nozzle and axis"
+CUT = "the box cuts the spray at its sides all along, so its axis is not known: state nozzle and axis, or widen the box"
 PARALLEL = "droplets fly too much alike to say where they come from: state the nozzle"
 
 
@@ -82,30 +94,80 @@ def proposed_axis(sample: SpraySample) -> ProposedAxis:
     flying = paired.chosen(speeds_m_s[:, 0] > 0)
     if len(flying) < FEWEST:
         return ProposedAxis(reason=NO_VELOCITIES)
-    ways = flying.velocities_m_s / np.linalg.norm(flying.velocities_m_s, axis=1, keepdims=True)
+    nozzle = _nozzle(flying)
+    nozzle_mm = np.array([one.value for one in nozzle])
+    if len(nozzle) < 3:
+        return ProposedAxis(reason=NOT_ALIKE)
+    x, y, z = nozzle
+    main = SprayAxis((*nozzle_mm,), _direction(flying)[0])
+    missing = _no_nozzle(main, flying, np.array([one.high - one.low for one in nozzle]))
+    place = None if missing else (x, y, z)
+    whole = flying.chosen(_uncut(main, flying))
+    if missing == AMID or len(whole) < FEWEST:
+        return ProposedAxis(nozzle_mm=place, reason=missing or CUT)
+    axis, within_deg = _direction(whole)
+    if _lopsided(SprayAxis((*nozzle_mm,), axis), whole, within_deg):
+        return ProposedAxis(reason=NOT_ALIKE)
+    return ProposedAxis(nozzle_mm=place, axis=axis, axis_within_deg=within_deg, reason=missing)
+
+
+def _no_nozzle(main: SprayAxis, flying: SpraySample, widths_mm: FloatArray) -> str | None:
+    """Why lines along the velocities meet at no nozzle: a swirl, too much alike along the axis, or amid the droplets."""
+    along_mm, _, _ = main.coordinates(flying.points_mm)
+    if _swirls(main, flying):
+        return SWIRLS
+    if np.linalg.norm(widths_mm * main.frame[0]) > MOST_UNSURE * abs(along_mm.mean()):
+        return PARALLEL
+    return AMID if np.mean(along_mm < 0) > MOST_BEHIND else None
+
+
+def _lopsided(axis: SprayAxis, whole: SpraySample, within_deg: float) -> bool:
+    """Whether the mean direction is no axis: opposite sides have other numbers, or other angles from it."""
+    if _unlike(axis, whole.points_mm) > MOST_UNLIKE + len(whole) ** -0.5:
+        return True
+    lean = lean_of(whole, whole.velocities_m_s, axis)
+    return lean is not None and lean[0] > SURER * within_deg
+
+
+def _nozzle(flying: SpraySample) -> list[Estimate]:
+    """Where lines along the velocities meet: x, y, z, as far as they are known."""
+    ways = _ways(flying)
     scatter2 = _scatter2(ways, flying.points_mm)
 
     def figures_of(drawn: SpraySample) -> Figures:
         sums = drawn.totals(_addends(ways, drawn.points_mm))
-        return lambda counts: _figures(sums(counts), scatter2)
+        return lambda counts: _nearest(sums(counts), scatter2)
 
-    told = flying.estimated(figures_of, signed=True)
-    axis = _unit(ways.mean(axis=0))
-    nozzle = [one for one in told[:3] if one is not None]
-    nozzle_mm = np.array([one.value for one in nozzle])
-    if len(nozzle) < 3 or _unlike(SprayAxis((*nozzle_mm,), (*axis,)), flying.points_mm) > MOST_UNLIKE:
-        return ProposedAxis(reason=NOT_ALIKE)
-    across = [0.5 * (one.high - one.low) for one in told[3:] if one is not None]
-    within_deg = float(np.degrees(np.linalg.norm(across)))
-    widths_mm = np.array([one.high - one.low for one in nozzle])
-    far_mm = abs((flying.points_mm.mean(axis=0) - nozzle_mm) @ axis)
-    reason = PARALLEL if np.linalg.norm(widths_mm * axis) > MOST_UNSURE * far_mm else None
-    reason = SWIRLS if _swirls(SprayAxis((*nozzle_mm,), (*axis,)), flying) else reason
-    x, y, z = nozzle
-    u, v, w = axis.tolist()
-    return ProposedAxis(
-        nozzle_mm=None if reason else (x, y, z), axis=(u, v, w), axis_within_deg=within_deg, reason=reason
-    )
+    return [one for one in flying.estimated(figures_of, signed=True) if one is not None]
+
+
+def _direction(flying: SpraySample) -> tuple[tuple[float, float, float], float]:
+    """Mean direction, and within how many degrees it is known."""
+    ways = _ways(flying)
+
+    def mean_of(drawn: SpraySample) -> Figures:
+        sums = drawn.totals(ways)
+        return lambda counts: _units(sums(counts))
+
+    told = flying.estimated(mean_of, signed=True)
+    half = [0.5 * (one.high - one.low) for one in told if one is not None]
+    ((u, v, w),) = _units(ways.sum(axis=0, keepdims=True)).tolist()
+    return (u, v, w), float(np.degrees(np.linalg.norm(half)))
+
+
+def _uncut(axis: SprayAxis, flying: SpraySample) -> NDArray[np.bool_]:
+    """Droplets of those slices across the axis in which the box cuts off next to nothing at its sides.
+
+    Where it does, the mean direction is drawn to the middle of the box.
+    """
+    if flying.box_mm is None:
+        return np.ones(len(flying), np.bool_)
+    along_mm, _, _ = axis.coordinates(flying.points_mm)
+    middle_mm = np.array(axis.nozzle_mm) + along_mm[:, None] * axis.frame[0]
+    wider_mm = middle_mm + WIDER * (flying.points_mm - middle_mm)
+    cut = ((wider_mm < flying.box_mm[0]) | (wider_mm > flying.box_mm[1])).any(axis=1)
+    place = np.argsort(np.argsort(along_mm, kind="stable"), kind="stable") * SLICES // len(flying)
+    return np.asarray((np.bincount(place, cut, SLICES) <= MOST_CUT * np.bincount(place, minlength=SLICES))[place])
 
 
 def _rounded(value: float, digits: int) -> str:
@@ -114,30 +176,28 @@ def _rounded(value: float, digits: int) -> str:
 
 
 def _addends(ways: FloatArray, points_mm: FloatArray) -> FloatArray:
-    """What each droplet adds to the equations of the nearest point: (N, 16)."""
+    """What each droplet adds to the equations of the nearest point: (N, 13)."""
     across = np.eye(3) - ways[:, :, None] * ways[:, None, :]
     matrix = np.column_stack([across[:, one, other] for one, other in PAIRS])
-    return np.column_stack([matrix, np.einsum("nij,nj->ni", across, points_mm), points_mm, ways, np.ones(len(ways))])
+    return np.column_stack([matrix, np.einsum("nij,nj->ni", across, points_mm), points_mm, np.ones(len(ways))])
 
 
-def _figures(sums: FloatArray, scatter2: float) -> FloatArray:
-    """Nearest point and direction (rows, 6) of sums (rows, 16); of no droplets not a number."""
+def _nearest(sums: FloatArray, scatter2: float) -> FloatArray:
+    """Points that are nearest to all lines, (rows, 3), of sums (rows, 13); of no droplets not a number."""
     matrix = np.empty((len(sums), 3, 3))
     for number, (one, other) in enumerate(PAIRS):
         matrix[:, one, other] = matrix[:, other, one] = sums[:, number]
-    count = sums[:, 15, None, None]
+    count = sums[:, 12, None, None]
     right = sums[:, 6:9] - scatter2 * sums[:, 9:12]
     points = np.einsum("rij,rj->ri", np.linalg.pinv(matrix - scatter2 * count * np.eye(3), hermitian=True), right)
-    with np.errstate(invalid="ignore"):
-        directions = sums[:, 12:15] / np.linalg.norm(sums[:, 12:15], axis=1, keepdims=True)
-    return np.where(count[:, :, 0] > 0, np.hstack([points, directions]), np.nan)
+    return np.where(count[:, :, 0] > 0, points, np.nan)
 
 
 def _scatter2(ways: FloatArray, points_mm: FloatArray) -> float:
     """Mean square of the angle by which droplets fly beside the line from the nozzle."""
     sums, scatter2 = _addends(ways, points_mm).sum(axis=0)[None], 0.0
     for _ in range(ROUNDS):
-        from_mm = points_mm - _figures(sums, scatter2)[0, :3]
+        from_mm = points_mm - _nearest(sums, scatter2)[0]
         missed_mm = from_mm - np.sum(from_mm * ways, axis=1, keepdims=True) * ways
         scatter2 = float(np.median(np.sum(missed_mm**2, axis=1) / np.sum(from_mm**2, axis=1)) / MEDIAN_OF_TWO)
     return scatter2
@@ -147,8 +207,15 @@ MEDIAN_OF_TWO = float(np.log(2))
 """Median over mean of a sum of two squares that are normal."""
 
 
-def _unit(vector: FloatArray) -> FloatArray:
-    return np.asarray(vector / np.linalg.norm(vector), dtype=np.float64)
+def _ways(flying: SpraySample) -> FloatArray:
+    """Directions in which droplets fly, (N, 3) of length 1."""
+    return np.asarray(flying.velocities_m_s / np.linalg.norm(flying.velocities_m_s, axis=1, keepdims=True))
+
+
+def _units(vectors: FloatArray) -> FloatArray:
+    """The same directions, (rows, 3); of no droplets not a number."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True), dtype=np.float64)
 
 
 def _unlike(axis: SprayAxis, points_mm: FloatArray) -> float:
@@ -160,7 +227,7 @@ def _unlike(axis: SprayAxis, points_mm: FloatArray) -> float:
 
 def _swirls(axis: SprayAxis, flying: SpraySample) -> bool:
     """Whether droplets fly around the axis, more than chance and more than a little of how they fly away from it."""
-    ways = flying.velocities_m_s / np.linalg.norm(flying.velocities_m_s, axis=1, keepdims=True)
+    ways = _ways(flying)
     _, radial = axis.components(ways, flying.points_mm)
     around = axis.around(ways, flying.points_mm)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from processing.analysis.spray.axis_doubts import axis_doubts
-from processing.analysis.spray.proposed_axis import SWIRLS, proposed_axis
+from processing.analysis.spray.proposed_axis import CUT, SWIRLS, proposed_axis
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
 
@@ -59,10 +59,10 @@ def test_an_axis_that_is_stated_aside_is_told_with_what_the_droplets_say(half_de
 @pytest.mark.parametrize("nozzle_mm", [(1.0, 0, 0), (0, 3.0, 0), (0, -2.0, 0), (0.5, 0, -0.6)])
 def test_a_nozzle_that_is_stated_elsewhere_is_told_with_where_lines_meet(nozzle_mm: tuple[float, float, float]) -> None:
     said = told(cone(nozzle_mm=nozzle_mm))
-    assert " mm from the stated nozzle, 0,0,0 mm: is its place stated rightly?" in said
+    assert " mm from the stated nozzle, 0,0,0 mm, at " in said
+    assert "is its place stated rightly?" in said
     off_mm = float(np.linalg.norm(nozzle_mm))
     assert abs(float(said.split(" meet ")[1].split()[0]) - off_mm) < 0.1 * off_mm
-    assert "proposed by how droplets fly: --nozzle=" in said
 
 
 def test_without_velocities_places_tell_a_nozzle_beside_the_axis() -> None:
@@ -83,6 +83,41 @@ def test_what_is_stated_rightly_is_not_doubted_however_a_box_cuts_the_spray_or_l
         assert not told(cone(seed, box_mm=one_side, flies=flies))
         assert not told(cone(seed, box_mm=narrow, flies=flies))
         assert not told(cone(seed, lopsided=0.35, flies=flies))
+
+
+def fan(half_deg: float, box_mm: np.ndarray, axis: tuple[float, float, float] = (0, 1, 0)) -> SpraySample:
+    """Flat along x, evenly in its angle."""
+    whole = cone(half_deg=1.0, box_mm=np.array([[-99.0, -99, -99], [99, 99, 99]]))
+    rng, count = np.random.default_rng(5), len(whole)
+    angles = np.radians(np.column_stack([rng.uniform(-half_deg, half_deg, count), rng.normal(0, 2, count)]))
+    ways = (
+        np.column_stack([np.tan(angles[:, 0]), np.ones(count), np.tan(angles[:, 1])])
+        @ SprayAxis((0, 0, 0), axis).frame[[1, 0, 2]]
+    )
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    points_mm = ways * rng.uniform(4, 14, (count, 1))
+    seen = ((points_mm > box_mm[0]) & (points_mm < box_mm[1])).all(axis=1)
+    flight = 15 * (ways + rng.normal(0, 0.03, ways.shape))
+    return SpraySample(
+        whole.diameters_um[seen], points_mm[seen], flight[seen], whole.shot[seen], whole.volumes_mm3, 1.0, box_mm
+    )
+
+
+WIDE_MM = np.array([[-11.0, 2, -3], [11, 13, 3]])
+
+
+def test_of_a_fan_the_proposal_tells_an_axis_that_is_stated_aside() -> None:
+    assert not told(fan(30.0, WIDE_MM))
+    assert "degrees (99 %: within" in told(fan(30.0, WIDE_MM, (0.14, 1, 0)))
+
+
+def test_a_fan_that_the_box_cuts_to_one_side_has_no_axis_but_a_nozzle() -> None:
+    """The mean direction would be 9 degrees aside, within half a degree."""
+    found = proposed_axis(fan(30.0, np.array([[-8.0, 4, -3], [2, 11, 3]])))
+    assert (found.axis, found.reason) == (None, CUT)
+    assert found.nozzle_mm is not None
+    assert found.believed is None
+    assert CUT in found.words
 
 
 def test_two_nozzles_around_the_stated_one_are_told() -> None:
