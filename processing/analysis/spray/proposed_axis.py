@@ -112,7 +112,7 @@ def proposed_axis(sample: SpraySample) -> ProposedAxis:
 
 
 def _no_nozzle(main: SprayAxis, flying: SpraySample, widths_mm: FloatArray) -> str | None:
-    """Why lines along the velocities meet at no nozzle: a swirl, too much alike along the axis, or amid the droplets."""
+    """Why lines along the velocities meet at no nozzle: a swirl, too much alike along the axis, amid the droplets."""
     along_mm, _, _ = main.coordinates(flying.points_mm)
     if _swirls(main, flying):
         return SWIRLS
