@@ -3,8 +3,10 @@
 In the order in which they were taken, shots are split in two wherever the parts differ most, and a straight line is
 laid through them: ``t`` is a difference, or a slope, over its standard error, as shots scatter beside it. How large
 chance makes the largest ``t`` of so many shots of one spray is drawn from normal numbers (a change at a place that
-nobody knows: Hawkins, Testing a sequence of observations for a shift in location, JASA 72, 1977). Many shots are taken
-in groups.
+nobody knows: Hawkins, Testing a sequence of observations for a shift in location, JASA 72, 1977). Shots of two sprays
+in turns are two heaps: the same is asked of the shots in the order of their values, beside normal numbers in theirs
+(Engelman and Hartigan, Percentage points of a test for clusters, JASA 64, 1969). More than 60 shots are taken in
+groups, which hides turns.
 """
 
 from collections.abc import Iterator
@@ -20,12 +22,12 @@ from processing.analysis.spray.spray_axis import SprayAxis, direction_name
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
 
-FEWEST, MOST = 4, 30
+FEWEST, MOST = 4, 60
 """Shots, and groups of them; each part has two at least."""
 FEWEST_DROPLETS = 5
 """Of a group."""
 CHANCE, DRAWS = 0.001, 10_000
-"""How often chance makes as much of one of some ten figures: one of a hundred sprays."""
+"""How often chance makes as much of one of some ten figures, twice: two of a hundred sprays are called so."""
 LEAST_RATIO, LEAST_RATIO_NUMBER = 1.05, 1.1
 """Of what matters, whatever chance does: of D32, speed and angles; of the number of droplets."""
 LEAST_TURN_DEG = 1.5
@@ -35,17 +37,24 @@ LEAST_SHIFT = 0.1
 REMEDY = "means over them are of no one spray, and intervals do not know it: take those apart that belong together"
 
 
-@dataclass(frozen=True)
-class _Change:
-    """Where a figure changes: shots before, and the means of both parts."""
+@dataclass(frozen=True, eq=False)
+class _Series:
+    """A figure of every group of shots, how it is said, and how much of a change matters: a ratio, or a difference."""
 
-    shots: int
-    before: float
-    after: float
+    text: str
+    values: FloatArray
+    least_ratio: float | None = None
+    least: float = 0.0
+    in_turns: bool = True
+
+    def matters(self, before: float, after: float) -> bool:
+        if self.least_ratio is None:
+            return abs(after - before) > self.least
+        return not 1 / self.least_ratio < after / before < self.least_ratio
 
 
 def changes_of_spray(sample: SpraySample, axis: SprayAxis | None = None) -> tuple[str, ...]:
-    """Say what of a spray changes from its first shots to its last ones.
+    """Say what of a spray changes from its first shots to its last ones, or is of two kinds.
 
     Parameters
     ----------
@@ -58,53 +67,53 @@ def changes_of_spray(sample: SpraySample, axis: SprayAxis | None = None) -> tupl
     if shots < FEWEST:
         return ()
     groups = np.arange(shots) // -(-shots // MOST)
-    told = [*_of_numbers(sample, groups), *_of_flight(sample, axis, groups)]
-    told += _of_places(sample, groups)
+    series = [*_of_numbers(sample, groups), *_of_flight(sample, axis, groups), *_of_places(sample, groups)]
+    told = [said for one in series if (said := _in_order(one, groups) or _in_turns(one))]
     return (f"the spray changes over its shots: {'; '.join(told)}: {REMEDY}",) if told else ()
 
 
-def _of_numbers(sample: SpraySample, groups: NDArray[np.intp]) -> Iterator[str]:
-    """Droplets per volume, and their mean diameters: D10 knows a change sooner than D32."""
+def _of_numbers(sample: SpraySample, groups: NDArray[np.intp]) -> Iterator[_Series]:
+    """Droplets per volume, which gusts make of any kind, and mean diameters: D10 knows a change sooner than D32."""
     with np.errstate(invalid="ignore"):
         per_mm3 = np.bincount(groups[sample.shot], minlength=groups[-1] + 1) / np.bincount(groups, sample.volumes_mm3)
-    yield from _ratio_told("droplets per mm3 are {}", per_mm3, LEAST_RATIO_NUMBER, groups)
+    yield _Series("droplets per mm3 are {}", per_mm3, LEAST_RATIO_NUMBER, in_turns=False)
     d_um = sample.diameters_um
     number, length, area, volume = _sums(d_um[:, None] ** np.arange(4), sample, groups).T
-    yield from _ratio_told("D10 is {} um", length / number, LEAST_RATIO, groups)
-    yield from _ratio_told("D32 is {} um", volume / area, LEAST_RATIO, groups)
+    yield _Series("D10 is {} um", length / number, LEAST_RATIO)
+    yield _Series("D32 is {} um", volume / area, LEAST_RATIO)
 
 
-def _of_flight(sample: SpraySample, axis: SprayAxis | None, groups: NDArray[np.intp]) -> Iterator[str]:
+def _of_flight(sample: SpraySample, axis: SprayAxis | None, groups: NDArray[np.intp]) -> Iterator[_Series]:
     """Speed, direction, how far from it droplets fly, and where they come from."""
     flying = sample.chosen(sample.paired & (np.abs(sample.velocities_m_s) > 0).any(axis=1))
     if not len(flying):
         return
     speeds_m_s = np.linalg.norm(flying.velocities_m_s, axis=1)
     ways = flying.velocities_m_s / speeds_m_s[:, None]
-    main = SprayAxis((0, 0, 0), tuple((ways.mean(axis=0) if axis is None else axis.frame[0]).tolist()))
+    main = axis or SprayAxis((0, 0, 0), tuple(ways.mean(axis=0).tolist()))
     from_deg = np.degrees(np.arccos(np.clip(ways @ main.frame[0], -1, 1)))
     speed_m_s, cone_deg = _means(np.column_stack([speeds_m_s, from_deg]), flying, groups).T
-    yield from _ratio_told("speed is {} m/s", speed_m_s, LEAST_RATIO, groups)
-    yield from _ratio_told("droplets fly {} degrees from their axis", cone_deg, LEAST_RATIO, groups)
-    across = [direction_name(one) for one in main.frame[1:]]
-    turns_deg = tilts_deg(_sums(tilt_addends(main, ways), flying, groups)).T
-    for name, one_deg in zip(across, turns_deg, strict=True):
-        yield from _shift_told(f"their axis leans to {name} by {{}} degrees", one_deg, LEAST_TURN_DEG, groups)
-    if axis is None:
-        return
-    far_mm = float(axis.coordinates(flying.points_mm)[0].mean())
-    for name, crossed_mm in zip(
-        across, _means(axis.crossings_mm(flying.points_mm, ways), flying, groups).T, strict=True
-    ):
-        least_mm = np.tan(np.radians(LEAST_TURN_DEG)) * far_mm
-        yield from _shift_told(f"they come from {{}} mm along {name} from the nozzle", crossed_mm, least_mm, groups)
+    yield _Series("speed is {} m/s", speed_m_s, LEAST_RATIO)
+    yield _Series("droplets fly {} degrees from their axis", cone_deg, LEAST_RATIO)
+    turns_deg = tilts_deg(_sums(tilt_addends(main, ways), flying, groups))
+    yield from _across("their axis leans to {} by {{}} degrees", turns_deg, main, LEAST_TURN_DEG)
+    if axis:
+        crossed_mm = _means(axis.crossings_mm(flying.points_mm, ways), flying, groups)
+        least_mm = float(np.tan(np.radians(LEAST_TURN_DEG)) * axis.coordinates(flying.points_mm)[0].mean())
+        yield from _across("along {} they come from {{}} mm beside the nozzle", crossed_mm, axis, least_mm)
 
 
-def _of_places(sample: SpraySample, groups: NDArray[np.intp]) -> Iterator[str]:
+def _across(text: str, values: FloatArray, axis: SprayAxis, least: float) -> Iterator[_Series]:
+    """Of values along the two directions across an axis, (groups, 2)."""
+    for direction, column in zip(axis.frame[1:], values.T, strict=True):
+        yield _Series(text.format(direction_name(direction)), column, least=least)
+
+
+def _of_places(sample: SpraySample, groups: NDArray[np.intp]) -> Iterator[_Series]:
     """Where droplets lie in the mean."""
-    for name, places_mm in zip("xyz", _means(sample.points_mm, sample, groups).T, strict=True):
-        least_mm = LEAST_SHIFT * float(sample.points_mm[:, "xyz".index(name)].std())
-        yield from _shift_told(f"in the mean droplets lie at {name} = {{}} mm", places_mm, least_mm, groups)
+    least_mm = LEAST_SHIFT * sample.points_mm.std(axis=0) if len(sample) else np.zeros(3)
+    for name, places_mm, least in zip("xyz", _means(sample.points_mm, sample, groups).T, least_mm, strict=True):
+        yield _Series(f"in the mean droplets lie at {name} = {{}} mm", places_mm, least=float(least))
 
 
 def _sums(values: FloatArray, sample: SpraySample, groups: NDArray[np.intp]) -> FloatArray:
@@ -120,37 +129,38 @@ def _means(values: FloatArray, sample: SpraySample, groups: NDArray[np.intp]) ->
     return np.asarray(sums[:, :-1] / sums[:, -1:])
 
 
-def _ratio_told(text: str, values: FloatArray, least: float, groups: NDArray[np.intp]) -> Iterator[str]:
-    change = _change(values, groups)
-    if change and not 1 / least < change.after / change.before < least:
-        yield _parts(text, change, groups)
+def _in_order(series: _Series, groups: NDArray[np.intp]) -> str:
+    """How a figure changes from the first shots to the last ones; nothing where it does not, or chance explains it."""
+    known = np.flatnonzero(np.isfinite(series.values))
+    if not (split := _split(series.values[known])):
+        return ""
+    shots = int(np.searchsorted(groups, known[split]))
+    return _said(series, series.values[known], split, f"in the first {shots} shots", f"in {len(groups) - shots} later")
 
 
-def _shift_told(text: str, values: FloatArray, least: float, groups: NDArray[np.intp]) -> Iterator[str]:
-    change = _change(values, groups)
-    if change and abs(change.after - change.before) > least:
-        yield _parts(text, change, groups)
+def _in_turns(series: _Series) -> str:
+    """What a figure is in shots of two kinds; nothing where there are none."""
+    values = np.sort(series.values[np.isfinite(series.values)])
+    if not series.in_turns or not (split := _split(values, in_turns=True)):
+        return ""
+    share = round(100 * split / len(values))
+    return _said(series, values, split, f"in {share} % of the shots", "in the others, in turns")
 
 
-def _parts(text: str, change: _Change, groups: NDArray[np.intp]) -> str:
-    later = len(groups) - change.shots
+def _said(series: _Series, values: FloatArray, split: int, first: str, second: str) -> str:
+    before, after = float(values[:split].mean()), float(values[split:].mean())
     return (
-        f"{text.format(f'{change.before:.3g}')} in the first {change.shots} shots, {change.after:.3g} in {later} later"
+        f"{series.text.format(f'{before:.3g}')} {first}, {after:.3g} {second}" if series.matters(before, after) else ""
     )
 
 
-def _change(values: FloatArray, groups: NDArray[np.intp]) -> _Change | None:
-    """Where values of successive groups change, if chance does not explain it."""
-    known = np.flatnonzero(np.isfinite(values))
-    if len(known) < FEWEST or np.ptp(values[known]) == 0:
-        return None
-    t = _contrasts(values[known][None])[0]
-    if t.max() <= _by_chance(len(known)):
-        return None
-    split = 2 + int(np.argmax(t[:-1]))
-    before, after = known[:split], known[split:]
-    shots = int(np.searchsorted(groups, after[0]))
-    return _Change(shots, float(values[before].mean()), float(values[after].mean()))
+def _split(values: FloatArray, *, in_turns: bool = False) -> int:
+    """Before which value a figure changes, if chance does not explain it; else 0."""
+    n = len(values)
+    if n < FEWEST or np.ptp(values) == 0:
+        return 0
+    (t,) = _contrasts(values[None])
+    return 2 + int(np.argmax(t[: n - 3])) if t[: n - 3 + (not in_turns)].max() > _by_chance(n, in_turns) else 0
 
 
 def _contrasts(rows: FloatArray) -> FloatArray:
@@ -166,8 +176,9 @@ def _contrasts(rows: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(between * (n - 2) / within))
 
 
-@lru_cache(maxsize=MOST)
-def _by_chance(n: int) -> float:
-    """What the largest ``t`` of n normal numbers stays below."""
+@lru_cache(maxsize=2 * MOST)
+def _by_chance(n: int, in_turns: bool) -> float:
+    """What the largest ``t`` of n normal numbers stays below, as they come or in the order of their values."""
     drawn = np.random.default_rng(SEED).standard_normal((DRAWS, n))
-    return float(np.quantile(_contrasts(drawn).max(axis=1), 1 - CHANCE))
+    t = _contrasts(np.sort(drawn))[:, :-1] if in_turns else _contrasts(drawn)
+    return float(np.quantile(t.max(axis=1), 1 - CHANCE))

@@ -60,8 +60,8 @@ def test_two_sprays_one_after_the_other_are_told_with_both_angles_and_where_they
 @pytest.mark.parametrize(
     ("one", "what"),
     [
-        (sample(nozzle_x_mm=lambda shot: 0.1 * shot), "they come from "),
-        (sample(nozzle_x_mm=lambda shot: 1.0 * (shot > 4)), "mm along x from the nozzle"),
+        (sample(nozzle_x_mm=lambda shot: 0.1 * shot), "along x they come from "),
+        (sample(nozzle_x_mm=lambda shot: 1.0 * (shot > 4)), "mm beside the nozzle"),
         (sample(lean=lambda shot: 0.01 * shot), "their axis leans to x by"),
         (sample(faster=lambda shot: 1 - 0.02 * shot), "speed is "),
         (sample(larger=lambda shot: 1.3 if shot > 4 else 1.0), "D10 is "),
@@ -73,13 +73,18 @@ def test_whatever_changes_is_told(one: SpraySample, what: str) -> None:
     assert what in told(one)
 
 
+def test_two_sprays_in_turns_are_told_with_both_angles() -> None:
+    said = told(sample(half_deg=lambda shot: 30.0 if shot % 3 else 20.0))
+    assert "droplets fly 20 degrees from their axis in 40 % of the shots, 30.1 in the others, in turns" in said
+
+
 def test_a_change_of_many_shots_is_told_by_groups_of_them() -> None:
     said = told(sample(shots=70, faster=lambda shot: 1.2 if shot >= 30 else 1.0))
     assert "speed is 15 m/s in the first 30 shots, 18 in 40 later" in said
 
 
 def test_shots_that_only_scatter_are_no_change() -> None:
-    """95 % of 60 sprays, with gusts of 10 and 40 %; 1 % is what was meant."""
+    """95 % of 60 sprays, with gusts of 10 and 40 %; 2 % were of 1800."""
     said = [
         told(sample(seed, shots=shots, gusts=gusts))
         for seed in range(20)
