@@ -5,7 +5,7 @@ from typing import get_args
 
 from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, plan_droplets
-from processing.analysis.droplets.shadows.light_search import Light, NamedLight
+from processing.analysis.droplets.shadows.light.light_search import Light, NamedLight
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.calibration.calibration import Calibration
 from processing.coherent_light import MOST_RATIO

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL
-from processing.analysis.droplets.shadows.light_search import Light
+from processing.analysis.droplets.shadows.light.light_search import Light
 from processing.analysis.droplets.size_correction import SizeRows
 from processing.preprocessing import Polarity
 from processing.reconstruction.settings import FrozenValue, GridSettings
@@ -15,7 +15,7 @@ from processing.runs.liquid.objects import NozzleNumbers
 from processing.runs.measured_images import IgnoredPixels
 from processing.runs.recipe import recipe_sha256
 
-METHOD_VERSION = 10
+METHOD_VERSION = 11
 """Of what the numbers in a file of droplets mean."""
 
 

@@ -11,7 +11,9 @@ import numpy as np
 
 from daq.files.run_directory import ImageKey, RunReader, Shot, ShotFileError
 from processing.analysis.droplets.droplet_search import DropletSearch
-from processing.analysis.droplets.shadows.light_search import Relit, SeenLight, light_doubts, seen_light
+from processing.analysis.droplets.shadows.light.fringes import together
+from processing.analysis.droplets.shadows.light.light_search import Relit, seen_light
+from processing.analysis.droplets.shadows.light.seen_light import SeenLight
 from processing.analysis.droplets.shadows.shadow_finder import find_shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from processing.analysis.droplets.shadows.shadow_rounds import ShadowRounds
@@ -80,10 +82,11 @@ def _common_light(
 
     def in_light(condenser_ratio: float | None) -> Relit:
         relit = [finder.in_light(fit, condenser_ratio) for finder, fit in seen]
-        return Relit(np.concatenate([one.squares for one in relit]), np.concatenate([one.radii for one in relit]))
+        squares, radii = (np.concatenate(column) for column in zip(*((one.squares, one.radii) for one in relit)))
+        return Relit(squares, radii, together(one.fringes for one in relit))
 
     light = seen_light(in_light, resolved=all(finder.resolves_light(fit) for finder, fit in seen))
-    return None if light_doubts(light.share, _droplets(seen)) else replace(light, share=1.0)
+    return None if light.doubts(_droplets(seen)) else replace(light, share=1.0)
 
 
 def _found(shots: Iterable[Transmissions], search: DropletSearch, before_round: Callable[[], None]) -> _Seen:

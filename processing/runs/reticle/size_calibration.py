@@ -10,7 +10,8 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from daq.files.run_directory import RunReader
-from processing.analysis.droplets.shadows.light_search import Light, light_doubts
+from processing.analysis.droplets.shadows.light.light_search import Light
+from processing.analysis.droplets.shadows.light.seen_light import light_doubts
 from processing.analysis.droplets.size_correction import SizeRow
 from processing.analysis.reticle.reticle_sizes import ReticleSizes, measure_reticle
 from processing.analysis.reticle.size_groups import ReticleError

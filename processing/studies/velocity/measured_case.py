@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_search import DropletSearch
-from processing.analysis.droplets.shadows.light_search import Light
+from processing.analysis.droplets.shadows.light.light_search import Light
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import DropletCase

@@ -16,7 +16,8 @@ from dataclasses import replace
 
 from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
-from processing.analysis.droplets.shadows.light_search import LEAST_DROPLETS, Light, SeenLight, stated_ratio
+from processing.analysis.droplets.shadows.light.light_search import Light, stated_ratio
+from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS, SeenLight
 from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_candidates import Stage
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
@@ -69,7 +70,7 @@ def find_shadows(
     seen = (known_light() if few else None) or finder.light(fit)
     if seen.condenser_ratio is not None:
         fit = _purged(finder, finder.relit(fit, seen.condenser_ratio))
-    return replace(fit, light_share=seen.share, light_sd_voxel=seen.radius_sd)
+    return replace(fit, light=seen)
 
 
 def behind_gaussian_blur(shot: Transmissions, search: DropletSearch, fit: ShadowFit) -> FloatArray:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_search import Window
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.image_noise import LEAST_NOISE, noise_of
+from processing.analysis.droplets.shadows.light.seen_light import STATED, SeenLight
 from processing.analysis.droplets.shadows.masked_liquid import Mask
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, DiscOptics, Discs
 from processing.analysis.droplets.sight_lattice import SightLattice
@@ -83,10 +84,8 @@ class ShadowFit:
         Those that explain what is no droplet.
     masks : tuple of (rows, columns) bool arrays
         Pixels that look through it, and have no say; empty where there is none.
-    light_share : float
-        Of the droplets, which the light explains better than a Gaussian blur; 1 where it was stated.
-    light_sd_voxel : float
-        Standard deviation that all radii share because the light is not known better.
+    light : SeenLight
+        What droplets said of it, with radii in voxels.
     """
 
     discs: Discs
@@ -95,8 +94,7 @@ class ShadowFit:
     defects: tuple[Image, ...] = ()
     liquid: Discs = NO_DISCS
     masks: tuple[Mask, ...] = ()
-    light_share: float = 1.0
-    light_sd_voxel: float = 0.0
+    light: SeenLight = STATED
 
     def with_discs(self, discs: Discs) -> "ShadowFit":
         """The same with other droplets."""

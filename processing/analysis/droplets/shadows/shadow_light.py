@@ -9,7 +9,8 @@ from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
-from processing.analysis.droplets.shadows.light_search import LEAST_DROPLETS, light_doubts
+from processing.analysis.droplets.shadows.light.fringes import fringes_of
+from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS, without_fringes
 from processing.analysis.droplets.shadows.masked_liquid import UNEXPLAINED
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise
@@ -28,13 +29,6 @@ LIGHTS = (0.5, 2.0)
 FREE_PERCENTILE = 98
 BLACK, BLACK_PIXELS = 0.2, 10
 """Where discs let less light through than this, images are asked how much they see beyond that, at so many pixels."""
-FREE, BRIGHTER = 0.001, 0.002
-"""Light beyond 1 that counts as none, and as a fringe's: fringes are brighter than the light by up to a fiftieth."""
-LEAST_FRINGES = 0.5
-"""Of those that a light makes. In simulated light of 0.3 to 0.8 apertures 0.87 to 1.15 of them are there; none (-0.1 to
-0.2) where droplets move, or lenses are out of focus, and light of 0.8 apertures explains them best."""
-SURE = 3.0
-"""Standard deviations by which fringes are fewer."""
 MOST_LEFT = 0.04
 """Share of the light that may be left there: diameters are 3 % too small then, and with twice as much ghosts come."""
 MANY_UNLIKE = 1 / 8
@@ -84,7 +78,7 @@ def judged_by_light(
     limits = COHERENT_LIMITS if (fit.optics.condenser_ratio or FRINGELESS) < FRINGELESS else LIMITS
     verdict, reasons = judged(beside_px, ratio, bare, limits)
     veiled = grey(asked, shadows) or veil_doubts(shot, search, fit)
-    doubts = (*veiled, *fringe_doubts(asked, shadows), *light_doubts(fit.light_share, len(fit.discs)))
+    doubts = (*veiled, *_fringe_doubts(asked, shadows), *fit.light.doubts(len(fit.discs)))
     if doubts and verdict is ShotVerdict.GOOD:
         verdict = ShotVerdict.DOUBTFUL
     return verdict, (*reasons, *doubts)
@@ -113,22 +107,10 @@ def grey(seen: DiscImages, shadows: Shadows) -> tuple[str, ...]:
     )
 
 
-def fringe_doubts(seen: DiscImages, shadows: Shadows) -> tuple[str, ...]:
+def _fringe_doubts(seen: DiscImages, shadows: Shadows) -> tuple[str, ...]:
     """What speaks against diameters in a light whose fringes are not there; empty in a light that makes none."""
-    share, weight = 0.0, 0.0
-    for image, drawn, known in zip(seen.images, shadows.transmissions, seen.weights, strict=True):
-        fringes, free = (drawn > 1 + BRIGHTER) & (known > 0), (np.abs(drawn - 1) < FREE) & (known > 0)
-        if fringes.any() and free.any():
-            weighed = (drawn[fringes] - 1) * known[fringes]
-            share += float(weighed @ (image[fringes] - np.mean(image[free])))
-            weight += float(weighed @ (drawn[fringes] - 1))
-    if weight == 0 or share / weight + SURE / np.sqrt(weight) > LEAST_FRINGES:
-        return ()
-    return (
-        f"droplets look as in light from few directions, and {100 * max(share / weight, 0):.0f} % of its fringes are "
-        f"there, limit {100 * LEAST_FRINGES:.0f} %: do they move while the light is on, or are lenses out of focus? "
-        "Diameters may be 10 um too small: shorten the pulses, or state --light gaussian of a lens that is not sharp",
-    )
+    fringes = fringes_of(seen, shadows)
+    return (without_fringes(fringes, "may be 10 um too small"),) if fringes.missing else ()
 
 
 def judged_by_shape(shot: MeasuredExposure[SizedDroplets, Seen]) -> MeasuredExposure[SizedDroplets, Seen]:

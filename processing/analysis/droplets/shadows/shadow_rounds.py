@@ -13,7 +13,9 @@ from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.shadows.disc_optics import refined_disc_optics
 from processing.analysis.droplets.shadows.disc_supports import DiscSupports, supporting_views, undisputed
 from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views
-from processing.analysis.droplets.shadows.light_search import LEAST_BLUR_PX, Relit, SeenLight, relit, seen_light
+from processing.analysis.droplets.shadows.light.fringes import fringes_of
+from processing.analysis.droplets.shadows.light.light_search import LEAST_BLUR_PX, Relit, seen_light
+from processing.analysis.droplets.shadows.light.seen_light import SeenLight
 from processing.analysis.droplets.shadows.masked_liquid import liquid_masks, liquid_objects
 from processing.analysis.droplets.shadows.merged_discs import merged_discs
 from processing.analysis.droplets.shadows.opaque_discs import (
@@ -23,6 +25,7 @@ from processing.analysis.droplets.shadows.opaque_discs import (
     Discs,
     Sweeps,
 )
+from processing.analysis.droplets.shadows.relit_discs import relit
 from processing.analysis.droplets.shadows.shadow_candidates import Stage, shadow_peaks
 from processing.analysis.droplets.shadows.shadow_fit import (
     ShadowFit,
@@ -94,9 +97,12 @@ class ShadowRounds:
         return seen_light(lambda ratio: self.in_light(fit, ratio), resolved=self.resolves_light(fit))
 
     def in_light(self, fit: ShadowFit, condenser_ratio: float | None) -> Relit:
-        """The droplets in some light, and what it leaves around each."""
+        """The droplets in some light, what it leaves around each, and how much of its fringes is there."""
         other = self.relit(fit, condenser_ratio)
-        return Relit(self._supports(other).residual ** 2, other.discs.radii_voxel)
+        shadows = self._recorded().drawn(other.optics, other.discs)
+        seen = seen_by(self._shot, other, shadows.transmissions)
+        squares = seen.supports(shadows, other.optics, other.discs).residual ** 2
+        return Relit(squares, other.discs.radii_voxel, fringes_of(seen, shadows))
 
     def resolves_light(self, fit: ShadowFit) -> bool:
         """Whether pixels are fine enough to tell the light."""

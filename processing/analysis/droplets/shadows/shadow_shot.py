@@ -18,7 +18,8 @@ from processing.analysis.droplets.shadows.judged_volume import (
     judging_views,
     knowing_views,
 )
-from processing.analysis.droplets.shadows.light_search import Light, SeenLight
+from processing.analysis.droplets.shadows.light.light_search import Light
+from processing.analysis.droplets.shadows.light.seen_light import SeenLight
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs
 from processing.analysis.droplets.shadows.shadow_finder import behind_gaussian_blur, find_shadows, nobody_knows

@@ -59,9 +59,8 @@ def sized_droplets(
 
 def _common_sd_um(fit: ShadowFit, diameters_um: FloatArray, pitch_um: float) -> FloatArray:
     """What all diameters share because of the light."""
-    if fit.optics.condenser_ratio is None:
-        return np.zeros(len(diameters_um))
-    return np.hypot(COHERENT_SHARE * diameters_um, 2 * fit.light_sd_voxel * pitch_um)
+    share = 0.0 if fit.optics.condenser_ratio is None else COHERENT_SHARE
+    return np.hypot(share * diameters_um, 2 * fit.light.radius_sd * pitch_um)
 
 
 def _p_real(shot: Transmissions, fit: ShadowFit, supports: DiscSupports) -> FloatArray:

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from processing.analysis.droplets.droplet_search import DropletSearch
-from processing.analysis.droplets.shadows.light_search import LEAST_DROPLETS
+from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS
 from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from processing.analysis.droplets.shadows.shadow_rounds import ShadowRounds

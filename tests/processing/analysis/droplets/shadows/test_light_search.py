@@ -9,8 +9,11 @@ from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import matches
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
-from processing.analysis.droplets.shadows.light_search import Relit, SeenLight, relit, seen_light
+from processing.analysis.droplets.shadows.light.fringes import Fringes
+from processing.analysis.droplets.shadows.light.light_search import Relit, seen_light
+from processing.analysis.droplets.shadows.light.seen_light import SeenLight
 from processing.analysis.droplets.shadows.opaque_discs import Discs
+from processing.analysis.droplets.shadows.relit_discs import relit
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit
 from processing.analysis.droplets.shadows.shadow_shot import measure_shadows
 from processing.geometry import FloatArray
@@ -68,6 +71,67 @@ def test_a_gaussian_blur_is_told_from_light_that_looks_much_like_it() -> None:
     np.testing.assert_array_equal(shot.droplets.diameters_um, shot.droplets.diameters_raw_um)
 
 
+def test_light_a_little_wider_than_the_lens_is_not_taken_for_light_from_all_directions() -> None:
+    """What is left has a second valley there, in which diameters would be 8 um larger."""
+    grid = study_grid(SHAPE)
+    scene = size_scene(SizeCase(10, condenser_ratio=1.2), grid, IMAGE_SIZE_PX, np.random.default_rng(5))
+    shot = measure_shadows(scene.images, plan_droplets(scene.believed, grid, margin_voxel=8))
+    match, _ = matches(shot.droplets.points_mm, scene.spray.positions_mm, grid.pitch_mm)
+    off_um = shot.droplets.diameters_um - 1000 * scene.spray.diameters_mm[match]
+    assert abs(np.median(off_um[match >= 0])) < 1.5
+    assert [view.condenser_ratio for view in shot.views.values()] == pytest.approx([1.2] * 4, abs=0.1)
+    assert shot.verdict is ShotVerdict.GOOD
+
+
+VALLEYS = {8.0: 2.0, 3.0: 3.0, 1.8: 3.0, 1.3: 1.5, 1.15: 3.0}
+
+
+@pytest.mark.parametrize(("gain", "sd"), [(1.0, 0.0), (60.0, 11.5)])
+def test_the_deeper_of_two_valleys_is_taken_and_how_far_the_other_one_lies_is_told(gain: float, sd: float) -> None:
+    """In one radii are larger by 20; where valleys differ by little of what both gain, either may be the light."""
+
+    def in_light(other: float | None) -> Relit:
+        left = 5.0 + gain * (other is None) if other not in VALLEYS else VALLEYS[other]
+        return Relit(np.full(30, np.exp(0.1 * left)), np.full(30, 20.0 * (other == 8)), Fringes())
+
+    seen = seen_light(in_light)
+    assert seen.condenser_ratio == pytest.approx(1.3)
+    assert seen.radius_sd == pytest.approx(sd, abs=0.1)
+
+
+FEW = Fringes(0.1, 0.05)
+LOST = Fringes(0.9, 0.5)
+THERE = Fringes(0.9, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("fringes", "better", "ratio", "said"),
+    [
+        (THERE, 30, 0.8, ""),
+        (THERE, 12, 0.8, ""),
+        (FEW, 30, None, "10 % of its fringes are there"),
+        (LOST, 30, None, "fringes would tell, and are lost in noise"),
+        (LOST, 15, None, "fringes would tell, and are lost in noise"),
+        (FEW, 0, None, ""),
+    ],
+)
+def test_light_from_few_directions_is_believed_where_its_fringes_are_seen(
+    fringes: Fringes, better: int, ratio: float | None, said: str
+) -> None:
+    """Larger droplets behind a Gaussian blur, and such that move, look as droplets in light of 0.8 apertures do."""
+
+    def in_light(other: float | None) -> Relit:
+        left = np.full(30, 4.0 if other == 0.8 else 8.0)
+        if other is None:
+            left[:better], left[better:] = 4.1, 3.9
+        return Relit(left, np.full(30, 2.0 * (other is None)), fringes if other == 0.8 else Fringes())
+
+    seen = seen_light(in_light)
+    assert seen.condenser_ratio == ratio
+    assert said in "; ".join(seen.doubts(30)) if said else not seen.doubts(30)
+    assert seen.radius_sd == (2 if said else 0)
+
+
 def test_the_ratio_that_leaves_least_is_taken_between_those_that_are_tried() -> None:
     def in_light(ratio: float | None) -> Relit:
         left = 9.0 if ratio is None else np.exp(0.4 * (1 / ratio - 1 / 0.37) ** 2)
@@ -106,7 +170,7 @@ def test_most_droplets_must_say_so(better: int, droplets: int, ratio: float | No
 def test_who_cannot_tell_the_light_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     grid = study_grid(SHAPE)
     scene = size_scene(SizeCase(7), grid, IMAGE_SIZE_PX, np.random.default_rng(7))
-    monkeypatch.setattr("processing.analysis.droplets.shadows.light_search.UNSURE", -0.1)
+    monkeypatch.setattr("processing.analysis.droplets.shadows.light.seen_light.UNSURE", -0.1)
     shot = measure_shadows(scene.images, plan_droplets(scene.believed, grid, margin_voxel=8))
     assert shot.verdict is ShotVerdict.DOUBTFUL
     assert "--light" in shot.reasons[-1]

@@ -127,6 +127,18 @@ def test_light_from_few_directions_has_fringes(ways_px: tuple[tuple[int, int]], 
     assert stated.droplets.diameters_um.mean() == pytest.approx(1000 * sharp.diameters_mm.mean(), rel=0.03)
 
 
+@pytest.mark.parametrize(("per_mm3", "noise"), [(3, 0.012), (14, 0.022)])
+def test_few_droplets_that_move_or_noise_are_no_light_from_few_directions(per_mm3: float, noise: float) -> None:
+    """Nobody can be sure that fringes are missing there, nor that they are there."""
+    rng = np.random.default_rng(1)
+    sharp = shadow_scene(SHAPE, per_mm3, IMAGE_SIZE_PX, seed=2, noise=0.0, blurs_px=(0.65,) * 4)
+    images = [np.mean([np.roll(image, row, axis=0) for row in (0, 1)], axis=0) for image in sharp.images]
+    noisy = [(image + rng.normal(0, noise, image.shape)).astype(np.float32) for image in images]
+    told = measure_shadows(noisy, search_of(sharp, MARGIN_VOXEL))
+    assert told.verdict is ShotVerdict.DOUBTFUL, told.droplets.diameters_um.mean()
+    assert told.droplets.diameters_um.mean() == pytest.approx(1000 * sharp.diameters_mm.mean(), rel=0.03)
+
+
 def test_pixels_too_coarse_to_tell_the_light_do_not_tell_it() -> None:
     """Edges sharper than a pixel look like light of 0.8 apertures, in which diameters would be 6 um too small."""
     coarse = shadow_scene(SHAPE, 14, IMAGE_SIZE_PX, seed=2, blurs_px=(0.3,) * 4)
