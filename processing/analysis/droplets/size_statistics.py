@@ -63,6 +63,9 @@ class SizeStatistics(FrozenValue):
     intervals_over: Annotated[
         Literal["shots", "droplets"] | None, Field(description="what the bootstrap draws; droplets: of one shot only")
     ] = None
+    light_sd_um: Annotated[
+        float, Field(description="that all diameters share as the light is not known better; intervals hold it")
+    ] = 0.0
     reason: Annotated[str | None, Field(description="why there are no diameters; null where there are")] = None
 
 

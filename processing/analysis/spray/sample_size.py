@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from processing.analysis.droplets.size_statistics import SizeStatistics
-from processing.analysis.estimates import CONFIDENCE, reach
+from processing.analysis.estimates import CONFIDENCE, MANY, reach
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.reconstruction.settings import FrozenValue
 
@@ -22,8 +22,6 @@ MOST_EXTREME = 0.02
 """Share of the volume in the largest droplet."""
 LARGEST_HALF_WIDTH = 0.05
 """Of the 95 % interval of D32, over its value, of a sample that is adequate."""
-MANY = 10**6
-"""Shots of which Student's t is the normal distribution's."""
 FEWEST_SHOTS = 5
 """Student's t of fewer is above 2.8, and says little of how shots differ."""
 
@@ -56,12 +54,12 @@ def sample_verdict(sample: SpraySample, sizes: SizeStatistics) -> SampleVerdict:
     sizes : SizeStatistics
         Their diameters, with 95 % intervals.
     """
-    half_width = _half_width(sizes)
+    half_width, by_shots = _half_width(sizes), _half_width_by_shots(sizes)
     share, largest_um, without_um = extreme_droplet(sample)
     needed = None
-    if half_width is not None and sizes.intervals_over == "shots":
+    if by_shots is not None and sizes.intervals_over == "shots":
         counted = sizes.shots * (_counted_half_width(sample) / LARGEST_HALF_WIDTH) ** 2
-        needed = max(shots_needed(half_width, sizes.shots), ceil(counted), FEWEST_SHOTS)
+        needed = max(shots_needed(by_shots, sizes.shots), ceil(counted), FEWEST_SHOTS)
     reasons = tuple(_reasons(sizes, share, half_width, needed))
     return SampleVerdict(
         verdict="low sample" if reasons else "adequate",
@@ -96,6 +94,14 @@ def _half_width(sizes: SizeStatistics) -> float | None:
     return None if d32 is None else float(np.log(d32.high / d32.low) / 2)
 
 
+def _half_width_by_shots(sizes: SizeStatistics) -> float | None:
+    """The same less what the light is not known to: more shots do not tell it."""
+    half_width, d32 = _half_width(sizes), sizes.d32_um
+    if half_width is None or d32 is None:
+        return None
+    return sqrt(max(half_width**2 - (reach(MANY) * sizes.light_sd_um / d32.value) ** 2, 0.0))
+
+
 def _counted_half_width(sample: SpraySample) -> float:
     """Of D32 over its value, if nothing but the number of droplets were left to chance; two exposures are one."""
     cubes, squares = sample.cubes_um3, sample.diameters_um**2
@@ -127,7 +133,12 @@ def _reasons(sizes: SizeStatistics, share: float | None, half_width: float | Non
     if half_width is None:
         reasons.append(sizes.reason or "there is no D32")
     elif half_width > LARGEST_HALF_WIDTH:
-        more = f": about {needed} shots would do" if needed else ""
+        more = f": about {needed} shots would do" if needed and needed > sizes.shots else ""
+        if sizes.light_sd_um:
+            more += (
+                f"; all diameters share {sizes.light_sd_um:.1f} um (one standard deviation), as the light is not known "
+                "better: state it (--light), or measure a reticle"
+            )
         reasons.append(
             f"D32 is known to {ceil(1000 * half_width) / 10:g} % ({100 * CONFIDENCE:g} % confidence), not to "
             f"{100 * LARGEST_HALF_WIDTH:g} %{more}"

@@ -53,6 +53,8 @@ class SeenShadows:
         Share of the pixels into the grid that look through liquid that is no droplet.
     condenser_ratio : float | None
         Numerical aperture of the light over that of the lens, the same for all views; None: blur is Gaussian.
+    light_sd_um : float
+        Standard deviation that all diameters share because the light is not known better, the same for all views.
     """
 
     noise: float
@@ -64,6 +66,7 @@ class SeenShadows:
     shift_v_px: float
     masked: float
     condenser_ratio: float | None = None
+    light_sd_um: float = 0.0
 
 
 ShadowExposure = MeasuredExposure[SizedDroplets, SeenShadows]
@@ -234,9 +237,9 @@ def _seen(fit: ShadowFit, search: DropletSearch, masked: Sequence[float]) -> dic
             masked,
         ]
     )
-    ratio = fit.optics.condenser_ratio
+    light = (fit.optics.condenser_ratio, 2000 * fit.light.radius_sd * search.searched.pitch_mm)
     seen = {name: SeenShadows(*row) for name, row in zip(search.names, rows.tolist(), strict=True)}
-    return {name: replace(view, condenser_ratio=ratio) for name, view in seen.items()}
+    return {name: replace(view, condenser_ratio=light[0], light_sd_um=light[1]) for name, view in seen.items()}
 
 
 def _twin_ghosts(

@@ -46,6 +46,24 @@ def test_shots_are_pooled() -> None:
     assert statistics.number_density_per_mm3 == shots_density([2, 1], [VOLUME_MM3] * 2)
 
 
+def test_intervals_hold_what_the_light_is_not_known_to() -> None:
+    """All diameters of a shot share it, and those of all shots: as many as there are do not take it out."""
+    sizes_um = np.linspace(40, 80, 50).tolist()
+    unsure = {"a": {**exposure(), "views": {name: {"light_sd_um": 3.0} for name in ("left", "right")}}}
+    sure, told = (
+        droplet_statistics([shot(sizes_um, exposures=one, shot=number) for number in range(20)])
+        for one in ({"a": exposure()}, unsure)
+    )
+    assert (sure.light_sd_um, told.light_sd_um) == (0, 3)
+    assert sure.d32_um is not None
+    assert told.d32_um is not None
+    assert told.d10_um is not None
+    assert told.d32_um.value == sure.d32_um.value
+    assert told.d32_um.high - told.d32_um.value > 5.8 > 2 > sure.d32_um.high - sure.d32_um.value
+    assert told.d10_um.low == pytest.approx(60 * np.exp(-1.96 * 3 / 60), rel=0.01)
+    assert told.relative_span == sure.relative_span
+
+
 def test_ghosts_are_those_of_all_droplets_whose_probability_is_told() -> None:
     first, other = shot([20.0, 30.0]), shot([40.0, 50.0], shot=4, exposures={"a": exposure("doubtful")})
     told = droplet_statistics([with_p_real(first, 0.8, 1.0), with_p_real(other, np.nan, np.nan)])

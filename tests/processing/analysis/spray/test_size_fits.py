@@ -112,6 +112,20 @@ def test_a_few_shots_say_how_many_it_would_take() -> None:
     assert f"about {few.shots_for_5_percent} shots would do" in few.reasons[-1]
 
 
+def test_more_shots_do_not_tell_the_light() -> None:
+    d_um = np.random.default_rng(0).permutation(lognorm.ppf(SHARES, 0.3, scale=40))
+    sizes = mean_diameters([d_um[shot::10] for shot in range(10)])
+    assert sizes.d32_um is not None
+    unsure = sizes.model_copy(
+        update={"light_sd_um": 3.0, "d32_um": sizes.d32_um.less_sure(1.96 * 3 / sizes.d32_um.value)}
+    )
+    known, told = (sample_verdict(sample_of(d_um, 10), one) for one in (sizes, unsure))
+    assert told.shots_for_5_percent == known.shots_for_5_percent
+    assert told.verdict == "low sample"
+    assert "3.0 um (one standard deviation), as the light is not known" in told.reasons[-1]
+    assert "shots would do" not in told.reasons[-1]
+
+
 @pytest.mark.parametrize("shots", [2, 3, 5, 40])
 def test_few_shots_do_not_ask_for_more_than_many_that_scatter_alike(shots: int) -> None:
     """A scatter of 12 % needs 25 shots: 2.06 times 12 % over 5 is 5 %; few shots have a far larger t themselves."""

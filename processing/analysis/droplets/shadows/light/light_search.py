@@ -93,7 +93,7 @@ def seen_light(relit: Callable[[float | None], Relit], *, resolved: bool = True)
         tried |= {ratio: relit(ratio) for ratio in unknown}
     best, alike = tried[_best(tried)], _alike(tried, blurred)
     fringes = _asked(alike)
-    share, other_sd = _share(best, blurred), abs(float(np.median(best.radii - blurred.radii)))
+    share, other_sd = _share(best, blurred), abs(float(np.median(best.radii - blurred.radii))) / np.sqrt(3)
     if fringes is not None and not fringes.seen and resolved:
         return SeenLight(None, share, other_sd, fringes)
     if not (fringes and fringes.seen) and not (resolved and _sure(share, len(best.squares))):

@@ -129,7 +129,7 @@ def test_light_from_few_directions_is_believed_where_its_fringes_are_seen(
     seen = seen_light(in_light)
     assert seen.condenser_ratio == ratio
     assert said in "; ".join(seen.doubts(30)) if said else not seen.doubts(30)
-    assert seen.radius_sd == (2 if said else 0)
+    assert seen.radius_sd == pytest.approx(2 / np.sqrt(3) if said else 0)
 
 
 def test_the_ratio_that_leaves_least_is_taken_between_those_that_are_tried() -> None:
