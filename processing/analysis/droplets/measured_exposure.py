@@ -86,6 +86,13 @@ class MeasuredExposure(Generic[Rows, Seen]):
             "hidden": asdict(self.hidden),
         }
 
+    def doubted(self, reasons: tuple[str, ...]) -> "MeasuredExposure[Rows, Seen]":
+        """The same with reasons why it is no good, if there are any; an empty one may not be empty then."""
+        if not reasons:
+            return self
+        verdict = ShotVerdict.REFUSED if self.verdict is ShotVerdict.REFUSED else ShotVerdict.DOUBTFUL
+        return replace(self, verdict=verdict, reasons=(*reasons, *self.reasons))
+
 
 def told_real(shot: MeasuredExposure[Rows, Seen]) -> MeasuredExposure[Rows, Seen]:
     """A shot that tells how probably droplets are real, or does not: only in good ones of droplets that was tried."""

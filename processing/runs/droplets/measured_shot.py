@@ -1,7 +1,7 @@
 """What became of a shot that was measured: its droplets, its velocities, and whether to believe them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -23,21 +23,13 @@ MOST_SPREAD = 0.01
 """Of the separation: views that differ by more see droplets at different times."""
 
 
-def doubted(measured: Exposure, reasons: tuple[str, ...]) -> Exposure:
-    """The same exposure with reasons why it is no good, if there are any; an empty one may not be empty then."""
-    if not reasons:
-        return measured
-    verdict = ShotVerdict.REFUSED if measured.verdict is ShotVerdict.REFUSED else ShotVerdict.DOUBTFUL
-    return replace(measured, verdict=verdict, reasons=(*reasons, *measured.reasons))
-
-
 def compared(exposures: tuple[Exposure, ...], velocities: MeasuredVelocities | None) -> tuple[Exposure, ...]:
     """The same exposures, doubted where droplets of A and the very same ones of B have other diameters."""
     if velocities is None:
         return exposures
     first, second = exposures
     told = unlike_sizes(first.droplets, second.droplets, velocities)
-    return tuple(doubted(exposure, (told,) if told else ()) for exposure in exposures)
+    return tuple(exposure.doubted((told,) if told else ()) for exposure in exposures)
 
 
 class ShotVelocity(FrozenValue):

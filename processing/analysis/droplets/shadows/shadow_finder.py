@@ -14,10 +14,12 @@ comes to rest.
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
 from processing.analysis.droplets.shadows.light.light_search import Light, stated_ratio
-from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS, SeenLight
+from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS, SeenLight, told_otherwise
 from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_candidates import Stage
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
@@ -31,6 +33,10 @@ FIRST, AGAIN = 0.5, 0.2
 """Missing share of the light from which on a candidate is tried: at first, and after a purge."""
 FALLING_ROUNDS, AGAIN_ROUNDS = 8, 3
 """In which it falls; after a purge."""
+COHERENT_SHARE = 0.02
+"""Of a diameter: what is wrong in any light that shows, common to the droplets of a shot."""
+CONTRADICTED = 2.0
+"""Of such shares, by which diameters in a stated light differ from those in the light that shows."""
 PURGES, SETTLED = 6, 0.003
 """So often at most disputed droplets are dropped and found anew; it ends when the others stay as many, about."""
 
@@ -71,6 +77,20 @@ def find_shadows(
     if seen.condenser_ratio is not None:
         fit = _purged(finder, finder.relit(fit, seen.condenser_ratio))
     return replace(fit, light=seen)
+
+
+def light_contradicted(
+    shot: Transmissions, search: DropletSearch, fit: ShadowFit, before_round: Callable[[], None]
+) -> tuple[str, ...]:
+    """What speaks against a light that was stated: droplets that tell another one for sure, with other diameters."""
+    finder = ShadowRounds(shot, search, before_round)
+    seen, stated = finder.light(fit), fit.optics.condenser_ratio
+    if not len(fit.discs) or seen.doubts(len(fit.discs)):
+        return ()
+    larger = finder.larger_than_stated(fit, seen.condenser_ratio)
+    if abs(larger) <= CONTRADICTED * COHERENT_SHARE * np.median(fit.discs.radii_voxel):
+        return ()
+    return (told_otherwise(stated, seen.condenser_ratio, 2000 * larger * search.searched.pitch_mm),)
 
 
 def behind_gaussian_blur(shot: Transmissions, search: DropletSearch, fit: ShadowFit) -> FloatArray:

@@ -14,7 +14,7 @@ from processing.analysis.droplets.shadows.disc_optics import refined_disc_optics
 from processing.analysis.droplets.shadows.disc_supports import DiscSupports, supporting_views, undisputed
 from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views
 from processing.analysis.droplets.shadows.light.fringes import fringes_of
-from processing.analysis.droplets.shadows.light.light_search import LEAST_BLUR_PX, Relit, seen_light
+from processing.analysis.droplets.shadows.light.light_search import LEAST_BLUR_PX, Relit, larger_than_stated, seen_light
 from processing.analysis.droplets.shadows.light.seen_light import SeenLight
 from processing.analysis.droplets.shadows.masked_liquid import liquid_masks, liquid_objects
 from processing.analysis.droplets.shadows.merged_discs import merged_discs
@@ -95,6 +95,10 @@ class ShadowRounds:
     def light(self, fit: ShadowFit) -> SeenLight:
         """What the droplets say of the light."""
         return seen_light(lambda ratio: self.in_light(fit, ratio), resolved=self.resolves_light(fit))
+
+    def larger_than_stated(self, fit: ShadowFit, seen: float | None) -> float:
+        """How much larger radii are, in voxels, in the light that droplets tell than in that of the fit."""
+        return larger_than_stated(lambda ratio: self.in_light(fit, ratio), fit.optics.condenser_ratio, seen)
 
     def in_light(self, fit: ShadowFit, condenser_ratio: float | None) -> Relit:
         """The droplets in some light, what it leaves around each, and how much of its fringes is there."""

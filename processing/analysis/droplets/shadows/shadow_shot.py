@@ -22,7 +22,12 @@ from processing.analysis.droplets.shadows.light.light_search import Light
 from processing.analysis.droplets.shadows.light.seen_light import SeenLight
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs
-from processing.analysis.droplets.shadows.shadow_finder import behind_gaussian_blur, find_shadows, nobody_knows
+from processing.analysis.droplets.shadows.shadow_finder import (
+    behind_gaussian_blur,
+    find_shadows,
+    light_contradicted,
+    nobody_knows,
+)
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise, seen_by
 from processing.analysis.droplets.shadows.shadow_light import covered_share, judged_by_light, judged_by_shape, unlit
 from processing.analysis.droplets.shadows.shadow_table import sized_droplets
@@ -126,7 +131,10 @@ def measure_shadows(
     if blind := blind_verdict(known_shadows, shot.noises_of(shot.images), search.names):
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind)
     fit = find_shadows(shot, search, light, before_round, known_light)
-    told = told_real(judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes))))
+    told = judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes)))
+    if light != "estimated" and told.verdict is ShotVerdict.GOOD:
+        told = told.doubted(light_contradicted(shot, search, fit, before_round))
+    told = told_real(told)
     count = twins_of(twins, len(images), search.lattice.directions)
     if not count or told.verdict is not ShotVerdict.GOOD:
         return told

@@ -8,12 +8,11 @@ from processing.analysis.droplets.reality import Evidence, Reality, crowding
 from processing.analysis.droplets.shadows.disc_supports import DiscSupports, supporting_views
 from processing.analysis.droplets.shadows.judged_volume import knowing_views
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Shadows
+from processing.analysis.droplets.shadows.shadow_finder import COHERENT_SHARE
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.geometry import FloatArray
 
-COHERENT_SHARE = 0.02
-"""Of a diameter: what is wrong in any light that shows, common to the droplets of a shot."""
 LEAST_NOISE = 0.5
 """Where places are told, over that of the image: less would be no noise of pixels."""
 REALITY = Reality(-8.94, (0.84, 2.74, 1.01, -2.2, -3.07, -2.65, -1.14), widths_px=(0.8, 1.6), most_crowding=1.0)

@@ -15,7 +15,7 @@ one that explains them as well, would make.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -29,6 +29,7 @@ NamedLight = Literal["estimated", "incoherent", "gaussian"]
 Light = Annotated[float, Field(gt=0, le=MOST_RATIO)] | NamedLight
 """The aperture of the light over that of the lens; from all directions; whatever is behind a Gaussian blur; or
 whichever of them explains the images best."""
+Ratio = TypeVar("Ratio", float, float | None)
 CONDENSER_RATIOS = (MOST_RATIO, 3.0, 1.8, 1.3, 1.15, 1.0, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
 """That are tried, from the least to the most coherent."""
 FIRST_TRIED = (MOST_RATIO, 1.15, 0.85, 0.8, 0.7)
@@ -102,6 +103,13 @@ def seen_light(relit: Callable[[float | None], Relit], *, resolved: bool = True)
     return SeenLight(ratio, _share(tried[ratio], blurred), radius_sd, fringes)
 
 
+def larger_than_stated(relit: Callable[[float | None], Relit], stated: float | None, seen: float | None) -> float:
+    """How much larger radii are in the light that is seen than in one that was stated; 0 where that fits alike."""
+    two = {ratio: relit(ratio) for ratio in (seen, stated)}
+    blurred = two.get(None) or relit(None)
+    return 0.0 if stated in _alike(two, blurred) else float(np.median(two[seen].radii - two[stated].radii))
+
+
 def _share(relit: Relit, blurred: Relit) -> float:
     """Of the droplets, which a light explains better than a Gaussian blur."""
     return float(np.mean(relit.squares < blurred.squares))
@@ -118,7 +126,7 @@ def _fit_alike(better: Relit, other: Relit, floor: float = 0.0) -> bool:
     return bool(more.mean() < max(floor, ALIKE_SD * more.std() / np.sqrt(len(more))))
 
 
-def _alike(tried: Mapping[float, Relit], blurred: Relit) -> dict[float, Relit]:
+def _alike(tried: Mapping[Ratio, Relit], blurred: Relit) -> dict[Ratio, Relit]:
     """The lights that leave as little as the best one, as far as that can be told; that one among them."""
     best = tried[_best(tried)]
     floor = ALIKE * float(np.mean(_logs(blurred) - _logs(best)))
@@ -136,12 +144,12 @@ def _logs(relit: Relit) -> FloatArray:
     return np.log(np.maximum(relit.squares, 1e-12))
 
 
-def _left(tried: Mapping[float, Relit]) -> FloatArray:
+def _left(tried: Mapping[Ratio, Relit]) -> FloatArray:
     """Of all lights (lights, N)."""
     return np.array([_logs(one) for one in tried.values()])
 
 
-def _best(tried: Mapping[float, Relit]) -> float:
+def _best(tried: Mapping[Ratio, Relit]) -> Ratio:
     return list(tried)[int(_left(tried).mean(axis=1).argmin())]
 
 

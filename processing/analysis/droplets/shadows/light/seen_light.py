@@ -84,3 +84,14 @@ def without_fringes(fringes: Fringes, wrong: str) -> str:
         f"there, limit {100 * LEAST_FRINGES:.0f} %: do they move while the light is on, or are lenses out of focus? "
         f"Diameters {wrong}: shorten the pulses, or state --light gaussian of a lens that is not sharp"
     )
+
+
+def told_otherwise(stated: float | None, seen: float | None, off_um: float) -> str:
+    """Why a light that was stated is doubted: droplets tell another one, in which diameters differ by so much."""
+    names = [
+        "behind a Gaussian blur" if ratio is None else f"in light of {ratio:g} apertures" for ratio in (stated, seen)
+    ]
+    return (
+        f"droplets are stated to be seen {names[0]}, and look as {names[1]}, where diameters are {abs(off_um):.1f} um "
+        f"{'larger' if off_um > 0 else 'smaller'}: state --light as the rig has it, or leave it out, and droplets tell"
+    )

@@ -10,7 +10,7 @@ from processing.analysis.droplets.ghost_share import matches
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
 from processing.analysis.droplets.shadows.light.fringes import Fringes
-from processing.analysis.droplets.shadows.light.light_search import Relit, seen_light
+from processing.analysis.droplets.shadows.light.light_search import NamedLight, Relit, seen_light
 from processing.analysis.droplets.shadows.light.seen_light import SeenLight
 from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.relit_discs import relit
@@ -81,6 +81,18 @@ def test_light_a_little_wider_than_the_lens_is_not_taken_for_light_from_all_dire
     assert abs(np.median(off_um[match >= 0])) < 1.5
     assert [view.condenser_ratio for view in shot.views.values()] == pytest.approx([1.2] * 4, abs=0.1)
     assert shot.verdict is ShotVerdict.GOOD
+
+
+@pytest.mark.parametrize(("ratio", "stated", "sound"), [(1.2, "incoherent", 1.2), (0.8, "gaussian", 0.8)])
+def test_a_stated_light_that_droplets_contradict_is_doubted(ratio: float, stated: NamedLight, sound: float) -> None:
+    """Diameters are 8 and 10 um too large in it, and nothing else is odd."""
+    grid = study_grid(SHAPE)
+    scene = size_scene(SizeCase(10, condenser_ratio=ratio), grid, IMAGE_SIZE_PX, np.random.default_rng(5))
+    search = plan_droplets(scene.believed, grid, margin_voxel=8)
+    assert measure_shadows(scene.images, search, light=sound).verdict is ShotVerdict.GOOD
+    doubted = measure_shadows(scene.images, search, light=stated)
+    assert doubted.verdict is ShotVerdict.DOUBTFUL
+    assert "leave it out, and droplets tell" in doubted.reasons[0]
 
 
 VALLEYS = {8.0: 2.0, 3.0: 3.0, 1.8: 3.0, 1.3: 1.5, 1.15: 3.0}
