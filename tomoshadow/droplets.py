@@ -14,7 +14,6 @@ from processing.grey_image import require_image
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, Polarity
 from processing.reconstruction.planning.calibrated_plan import telling_where
-from processing.runs.droplets.measured_shot import doubted
 from processing.runs.shots.stated_lengths import own_doubt
 from processing.volume import VoxelGrid
 
@@ -89,8 +88,8 @@ def measure(
     seen, doubts = list(images.values()), tuple(filter(None, [own_doubt(calibration, names)]))
     if polarity == "shadow":
         shadows = measure_shadows(seen, search, light=light, twins=twins, seed=seed, threads=threads)
-        return doubted(shadows, doubts)
-    return doubted(measure_bright(seen, search, twins=twins, seed=seed, threads=threads), doubts)
+        return shadows.doubted(doubts)
+    return measure_bright(seen, search, twins=twins, seed=seed, threads=threads).doubted(doubts)
 
 
 def _require_options(polarity: Polarity, light: Light) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from processing.analysis.droplets.droplet_file import DIAMETER, StoredDroplets
-from processing.analysis.droplets.shadows.light_search import LEAST_DROPLETS
+from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS
 from processing.analysis.droplets.shadows.masked_liquid import UNEXPLAINED
 from processing.analysis.droplets.shadows.shadow_light import MANY_UNLIKE
 from processing.analysis.unlike_sizes import FEWEST, LEAST_P_PAIR, LONGEST_NS, common_share, unlike_told

@@ -82,7 +82,7 @@ def _common_light(
 
     def in_light(condenser_ratio: float | None) -> Relit:
         relit = [finder.in_light(fit, condenser_ratio) for finder, fit in seen]
-        squares, radii = (np.concatenate(column) for column in zip(*((one.squares, one.radii) for one in relit)))
+        squares, radii = np.hstack([(one.squares, one.radii) for one in relit])
         return Relit(squares, radii, together(one.fringes for one in relit))
 
     light = seen_light(in_light, resolved=all(finder.resolves_light(fit) for finder, fit in seen))

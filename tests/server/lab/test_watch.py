@@ -241,6 +241,7 @@ def test_every_shot_that_stands_out_is_checked_one_after_the_other() -> None:
     following, *_ = [made(watch, shot, droplets=shot - 6)[0] for shot in range(8, 13)]
     asked = []
     while following is not None:
+        assert following.shot is not None
         asked.append(following.shot)
         following = watch.learn(ended(following.shot, 2.0))
     assert sorted(asked) == [8, 9, 10, 11, 12]
