@@ -37,12 +37,12 @@ def is_echo(line: bytes) -> bool:
 def is_older_reply(line: bytes) -> bool:
     """Whether it is a reply as firmware up to protocol 2 sends it, without a mark."""
     try:
-        return _OLDER_REPLY.match(unframed(line)) is not None
+        return _OLDER_REPLY.match(_unframed(line)) is not None
     except ValueError:
         return False
 
 
-def unframed(line: bytes) -> str:
+def _unframed(line: bytes) -> str:
     """Inverse of `framed`.
 
     Raises
@@ -63,7 +63,7 @@ def _crc16(body: bytes) -> int:
 
 def words(line: bytes, mark: str) -> list[str]:
     """What stands between mark and CRC of a line; DamagedLine without that mark."""
-    body = unframed(line)
+    body = _unframed(line)
     if not body.startswith(mark):
         raise DamagedLine(f"{line!r} does not begin with {mark}")
     return body.removeprefix(mark).split(" ")

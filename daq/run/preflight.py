@@ -121,7 +121,7 @@ class Preflight:
 
     def _refusals_of_numbers(self, plan: RunPlan) -> Iterator[DaqError]:
         """Why this plan cannot run, whatever its files say; they are read after this, as that takes longer."""
-        yield from refusals_of_light(self.rig, plan)
+        yield from _refusals_of_light(self.rig, plan)
         yield from refused(RefusalCode.STAGE, _check_stage, self.rig, plan)
         yield from refused(RefusalCode.DISK_FULL, _check_disk, self.data_dir, plan, self.views, self.disk_margin_bytes)
         yield from refused(RefusalCode.NETWORK, _check_network, self.rig, plan, self.views)
@@ -129,11 +129,11 @@ class Preflight:
 
 def permitted_timing(rig: Rig, plan: RunPlan) -> ShotTiming:
     """Edges of every shot of a plan; PlanError if a camera does not permit them, or an LED its current."""
-    raise_first(refusals_of_light(rig, plan))
+    raise_first(_refusals_of_light(rig, plan))
     return _timing(rig, plan)
 
 
-def refusals_of_light(rig: Rig, plan: RunPlan) -> Iterator[DaqError]:
+def _refusals_of_light(rig: Rig, plan: RunPlan) -> Iterator[DaqError]:
     """Why the light of a plan is none for this rig."""
     yield from refused(RefusalCode.CURRENT, _check_currents, rig, plan)
     yield from refused(RefusalCode.TIMING, _timing, rig, plan)

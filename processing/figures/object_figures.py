@@ -44,9 +44,9 @@ def objects_figure(curves: Mapping[str, BreakUpCurve], shot: ObjectsShot) -> Fig
     """All three side by side."""
     figure = Figure(figsize=(14, 4.6), layout="constrained")
     curve_axes, object_axes, map_axes = figure.subplots(1, 3)
-    draw_break_up(curve_axes, curves)
-    draw_objects(object_axes, shot.objects, shot.places)
-    draw_unseen(map_axes, shot.unseen)
+    _draw_break_up(curve_axes, curves)
+    _draw_objects(object_axes, shot.objects, shot.places)
+    _draw_unseen(map_axes, shot.unseen)
     return figure
 
 
@@ -55,19 +55,19 @@ def break_up_figure(curve: BreakUpCurve | None, name: str, objects: LiquidObject
     figure = Figure(figsize=(9.5 if curve else 5, 4.4), layout="constrained")
     *curve_axes, object_axes = figure.subplots(1, 2 if curve else 1, squeeze=False).ravel()
     if curve:
-        draw_break_up(curve_axes[0], {name: curve})
-    draw_objects(object_axes, objects, None)
+        _draw_break_up(curve_axes[0], {name: curve})
+    _draw_objects(object_axes, objects, None)
     return figure
 
 
 def unseen_figure(unseen: UnseenMap) -> Figure:
     """Where too few views see."""
     figure = Figure(figsize=(5.5, 3.8), layout="constrained")
-    draw_unseen(figure.add_subplot(), unseen)
+    _draw_unseen(figure.add_subplot(), unseen)
     return figure
 
 
-def draw_break_up(axes: Axes, curves: Mapping[str, BreakUpCurve]) -> None:
+def _draw_break_up(axes: Axes, curves: Mapping[str, BreakUpCurve]) -> None:
     """Curves with their intervals, and the truth as broken lines."""
     for (name, curve), colour in zip(curves.items(), VIEW_COLOURS, strict=False):
         share = curve.share
@@ -85,7 +85,7 @@ def draw_break_up(axes: Axes, curves: Mapping[str, BreakUpCurve]) -> None:
     axes.grid(alpha=0.25)
 
 
-def draw_objects(axes: Axes, objects: LiquidObjects, grid: VoxelGrid | None) -> None:
+def _draw_objects(axes: Axes, objects: LiquidObjects, grid: VoxelGrid | None) -> None:
     """Objects seen along z: ligaments as lines of their length and direction, others as circles of their length.
 
     Axes are those of the grid; without one, they are as wide as the objects.
@@ -113,7 +113,7 @@ def _draw_lengths(axes: Axes, objects: LiquidObjects, colour: str) -> None:
     axes.plot([first[:, 0], last[:, 0]], [first[:, 1], last[:, 1]], color=colour, linewidth=2)
 
 
-def draw_unseen(axes: Axes, unseen: UnseenMap) -> None:
+def _draw_unseen(axes: Axes, unseen: UnseenMap) -> None:
     """Share of each line along z that fewer than three views see."""
     share, span_mm = unseen.percent, (*unseen.x_mm, *unseen.y_mm[::-1])
     image = axes.imshow(share, extent=span_mm, cmap="magma_r", vmin=0, vmax=max(1.0, float(share.max())))

@@ -166,7 +166,7 @@ def volume_seen(
     """
     check_method(method)
     blocks = blocks or Part.all_of(plan.grid)
-    brightest = brightest_voxel(seen, method) or 1.0
+    brightest = _brightest_voxel(seen, method) or 1.0
     voxels = VoxelType(out.dtype.name)
     unit = 1.0 if voxels is VoxelType.FLOAT32 else 2.0 ** math.ceil(math.log2(brightest))
     views = plan.between(blocks.z).bind(_in_unit(seen, method, unit))
@@ -176,7 +176,7 @@ def volume_seen(
 
 def _unit_of_products(images: Sequence[FixedPoint], method: ReconstructionMethod, dtype: np.dtype[Any]) -> float:
     """A power of two near the brightest voxel of GAVLOS if that is far from 1: products of many views have no room."""
-    most = brightest_voxel(images, method)
+    most = _brightest_voxel(images, method)
     if method is not ReconstructionMethod.GAVLOS or dtype == np.uint8 or not most or 1 / FAR < most < FAR:
         return 1.0
     return float(2.0 ** math.ceil(math.log2(most)))
@@ -212,13 +212,13 @@ def check_method(method: ReconstructionMethod) -> None:
 
 def check_brightness(images: Sequence[FixedPoint], method: ReconstructionMethod, dtype: np.dtype[Any]) -> None:
     """Raise ValueError where a voxel could be brighter than its type has room for."""
-    most = brightest_voxel(images, method)
+    most = _brightest_voxel(images, method)
     room = 1.0 if dtype == np.uint8 else float(np.finfo(dtype).max)
     if most > room * (1 + 1e-6):
         raise ValueError(f"voxels of {dtype} hold intensities up to {room:.3g}, these may reach {most:.3g}")
 
 
-def brightest_voxel(images: Sequence[FixedPoint], method: ReconstructionMethod) -> float:
+def _brightest_voxel(images: Sequence[FixedPoint], method: ReconstructionMethod) -> float:
     """Largest intensity that a voxel could have: where the brightest pixels of all views meet."""
     brightest = [image.brightest for image in images]
     product = float(np.prod(brightest, dtype=np.float64))

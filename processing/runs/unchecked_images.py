@@ -80,7 +80,7 @@ def stated_scale(um_per_px: float) -> Unchecked:
     )
 
 
-def stated_separation(separation_ns: float) -> Unchecked:
+def _stated_separation(separation_ns: float) -> Unchecked:
     """Of double exposures whose pulses nobody recorded."""
     return Unchecked(
         f"whether exposure B comes {separation_ns:g} ns after A, as the run states: all velocities are in proportion, "
@@ -142,7 +142,7 @@ def unchecked_images(
     if undirected:
         yield ORDER
     if stated_ns is not None:
-        yield stated_separation(stated_ns)
+        yield _stated_separation(stated_ns)
     if unscaled:
         yield LENGTHS
     if shallow:

@@ -97,11 +97,11 @@ def _measure(part: str, options: Namespace, found: _Found) -> None:
         from processing.benchmarks.speed import speed_study
 
         speed = speed_study(study, progress)
-        found.result |= speed_json(speed)
-        found.texts.append(kernel_table(speed))
+        found.result |= _speed_json(speed)
+        found.texts.append(_kernel_table(speed))
         found.measured += speed.targets
     elif part == "recorder":
-        recorder = recorder_speed(options.directory, study.image_size_px)
+        recorder = _recorder_speed(options.directory, study.image_size_px)
         found.result["recorder"] = recorder
         found.texts.append(f"recorder: {recorder['shots_per_s']:.1f} shots/s, {recorder['mb_per_s']:.0f} MB/s")
     else:
@@ -127,7 +127,7 @@ def _of_programs(part: str, study: "SpeedStudy", options: Namespace) -> "Iterato
             yield from getattr(chain_on_disk, part)(run, Path(folder), study.threads)
 
 
-def speed_json(result: "SpeedResult") -> dict[str, Any]:
+def _speed_json(result: "SpeedResult") -> dict[str, Any]:
     """The JSON object of a speed study."""
     return {
         "isa": result.isa,
@@ -158,7 +158,7 @@ def split_at_table(report: Path) -> tuple[str, str, str]:
     return before + begin, old, end + after
 
 
-def kernel_table(result: "SpeedResult") -> str:
+def _kernel_table(result: "SpeedResult") -> str:
     """A line per kernel, for people."""
     rows = [
         [kernel.name, f"{kernel.wall_s:.4f}", f"{kernel.cpu_s:.4f}", f"{kernel.ratio_to_naive:.1f}"]
@@ -167,7 +167,7 @@ def kernel_table(result: "SpeedResult") -> str:
     return table(["kernel", "wall s", "CPU s", "times naive"], rows)
 
 
-def recorder_speed(directory: Path | None, image_size_px: tuple[int, int], views: int = 4) -> dict[str, float]:
+def _recorder_speed(directory: Path | None, image_size_px: tuple[int, int], views: int = 4) -> dict[str, float]:
     """Shots and raw megabytes per second that the recorder brings safely to the disk of ``directory``."""
     import numpy as np
 

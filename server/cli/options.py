@@ -72,10 +72,10 @@ def run_directory(text: str) -> Path:
 def add_out(parser: ArgumentParser, summary: str, default: Path | None = None) -> None:
     """Let a command be told where to write, and whether what is there may be replaced."""
     parser.add_argument("-o", "--out", type=Path, required=default is None, default=default, help=summary)
-    add_overwrite(parser)
+    _add_overwrite(parser)
 
 
-def add_overwrite(parser: ArgumentParser) -> None:
+def _add_overwrite(parser: ArgumentParser) -> None:
     """Let a command replace what exists."""
     parser.add_argument("--overwrite", action="store_true", help="replace what is there, once all is computed")
 

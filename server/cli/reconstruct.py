@@ -101,7 +101,7 @@ def _reconstruct_run(
             shots, belonging = _reconstruct_shots(options, settings, run_dir, indices, place)
     result = _result(settings, share, shots, belonging)
     told = (f"{place}: {_summary(result)}", result["light"], belonging.text)
-    return Outcome(result, "\n".join([volumes_table(result), *filter(None, told)]))
+    return Outcome(result, "\n".join([_volumes_table(result), *filter(None, told)]))
 
 
 def _result(
@@ -207,7 +207,7 @@ def _tell_faults(shot: "ShotResult") -> None:
         tell_faults(f"shot {volume.shot}, exposure {volume.frame}", volume.model_dump())
 
 
-def volumes_table(result: dict[str, Any]) -> str:
+def _volumes_table(result: dict[str, Any]) -> str:
     """A line per volume, for people."""
     rows = [
         [str(volume["shot"]), volume["frame"].upper(), f"{volume['seconds']:.2f}", volume["file"]]

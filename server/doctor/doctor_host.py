@@ -35,16 +35,16 @@ def check_host(data_dir: Path) -> Iterator[Checkup]:
     data_dir : Path
         Where runs are kept; it need not exist yet.
     """
-    yield check_system()
+    yield _check_system()
     yield check_packages()
-    yield check_aravis()
-    yield check_kernels()
-    yield check_namespaces()
+    yield _check_aravis()
+    yield _check_kernels()
+    yield _check_namespaces()
     yield check_receive_buffer()
     yield check_disk(data_dir)
 
 
-def check_system() -> Checkup:
+def _check_system() -> Checkup:
     """Processor, memory and operating system."""
     memory_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     detail = (
@@ -74,7 +74,7 @@ def _is_installed(name: str) -> bool:
     return True
 
 
-def check_aravis() -> Checkup:
+def _check_aravis() -> Checkup:
     """Aravis, which opens cameras; a computer that has none does without."""
     try:
         load_aravis("doctor")
@@ -83,7 +83,7 @@ def check_aravis() -> Checkup:
     return Checkup("aravis", Status.OK, "cameras can be opened")
 
 
-def check_kernels() -> Checkup:
+def _check_kernels() -> Checkup:
     """Instruction sets that the kernels use."""
     available, selected = _native.available_isas(), _native.selected_isa()
     detail = f"{selected} of {', '.join(available)}"
@@ -92,7 +92,7 @@ def check_kernels() -> Checkup:
     return Checkup("kernels", Status.OK, detail)
 
 
-def check_namespaces() -> Checkup:
+def _check_namespaces() -> Checkup:
     """Permission to have a network of one's own: demonstration and tests run in one."""
     command = ["unshare", "--user", "--net", "--map-root-user", "true"]
     try:

@@ -121,11 +121,11 @@ def preview_of(volume: Path) -> VolumePreview:
     try:
         with _MAKING:
             if volume.is_file() and not is_preview_of(stored, volume):
-                write_preview(volume)
+                _write_preview(volume)
             try:
                 preview = _load(stored, stored.stat().st_ctime_ns)
             except (OSError, ValueError, KeyError, zipfile.BadZipFile):
-                write_preview(volume)
+                _write_preview(volume)
                 preview = _load(stored, stored.stat().st_ctime_ns)
         _require_own_place(volume, load_provenance(stored))
         return preview
@@ -135,7 +135,7 @@ def preview_of(volume: Path) -> VolumePreview:
         raise Damaged(f"{volume.name} cannot be shown: {error}") from error
 
 
-def write_preview(volume: Path) -> None:
+def _write_preview(volume: Path) -> None:
     """Read a volume and leave its preview beside it."""
     with open_volume(volume) as stored:
         preview = preview_of_slabs(stored.slabs(), stored.grid)

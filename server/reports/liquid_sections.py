@@ -79,7 +79,7 @@ class ReportedLiquid:
 def break_up_section(liquid: ReportedLiquid) -> Section:
     """Numbers and sizes of objects, the break-up length with its limits or the reason why there is none, the curve."""
     found = break_up_of(liquid.reaches)
-    text = f"{break_up_text(found, liquid.true_mm)} {CLASSES_TEXT}"
+    text = f"{_break_up_text(found, liquid.true_mm)} {CLASSES_TEXT}"
     figure = break_up_figure(_curve(liquid, found), counted(found.shots, "shot"), liquid.shown)
     caption = (
         "Objects of one exposure, seen along z: ligaments as lines of their length and direction, others as circles as "
@@ -109,7 +109,7 @@ def _break_up_rows(liquid: ReportedLiquid) -> list[list[str]]:
     return [["break-up length [mm]", f"{found.value_mm:.2f}", f"{found.low_mm:.2f} to {high}"]]
 
 
-def break_up_text(found: BreakUp, true_mm: FloatArray | None = None) -> str:
+def _break_up_text(found: BreakUp, true_mm: FloatArray | None = None) -> str:
     """The break-up length in a sentence or two."""
     truth = "" if true_mm is None else f" In truth it is {np.median(true_mm):.2f} mm, the median of the shots."
     if found.value_mm is None or found.low_mm is None:

@@ -79,7 +79,7 @@ _REMEDIES: Mapping[str, str] = {
 }
 
 
-def status_of(error: Exception) -> HTTPStatus:
+def _status_of(error: Exception) -> HTTPStatus:
     """HTTP status of an error, by its type."""
     return next((STATUS_OF[kind] for kind in type(error).__mro__ if kind in STATUS_OF), HTTPStatus(500))
 
@@ -139,7 +139,7 @@ async def _on_known_error(request: Request, error: Exception) -> JSONResponse:
     more: dict[str, str | None] = {"device": error.device} if isinstance(error, DeviceError) else {}
     if isinstance(error, DaqError | ServerError) and error.code:
         more |= {"code": error.code, "remedy": _REMEDIES.get(error.code)}
-    return problem(request, status_of(error), str(error), f"urn:tomoshadow:{type(error).__name__}", **more)
+    return problem(request, _status_of(error), str(error), f"urn:tomoshadow:{type(error).__name__}", **more)
 
 
 async def _on_invalid_request(request: Request, error: RequestValidationError) -> JSONResponse:

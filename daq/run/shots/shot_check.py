@@ -123,9 +123,9 @@ def light_thresholds(bits: Mapping[str, int], dark: ReferenceImages, background:
     thresholds = {}
     for view, depth in bits.items():
         most = 2**depth - 1
-        low = [bright_level(image) for image in dark[view]] if view in dark else [0.0, 0.0]
+        low = [_bright_level(image) for image in dark[view]] if view in dark else [0.0, 0.0]
         if view in background:
-            high = [bright_level(image) for image in background[view]]
+            high = [_bright_level(image) for image in background[view]]
             levels = [_levels(a, b, most) for a, b in zip(low, high, strict=True)]
         else:
             levels = [LightLevels(LIT_FRACTION_OF_SCALE * most)] * 2
@@ -155,7 +155,7 @@ def _marked(frames: DoubleFrame, lit: bool, levels: tuple[LightLevels, LightLeve
 def _judged(image: Image | None, record: ExposureRecord, lit: bool, levels: LightLevels) -> ExposureRecord:
     if image is None or not record.valid:
         return record
-    level = bright_level(image)
+    level = _bright_level(image)
     if lit and level < levels.lit:
         return replace(record, flaw=Flaw.DARK)
     return replace(record, flaw=Flaw.DOUBLY_LIT) if level > levels.doubly_lit else record
@@ -177,6 +177,6 @@ def check_exposures(views: Mapping[str, DoubleFrame], misfired: str = "") -> Sho
     )
 
 
-def bright_level(image: Image | np.ndarray) -> float:
+def _bright_level(image: Image | np.ndarray) -> float:
     """Grey value that a tenth of an image (row, column) exceeds, from a coarse sample of it."""
     return float(np.percentile(image[::_STRIDE_PX, ::_STRIDE_PX], _BRIGHT_PERCENT))

@@ -21,7 +21,7 @@ def check_plane_order(calibration_set: CalibrationSet, views: Mapping[str, ViewC
     found: dict[tuple[float, float], list[str]] = {}
     for name, view in views.items():
         planes = calibration_set.views[name].planes
-        if view.verdict in (Verdict.WARN, Verdict.REFUSE) and (exchanged := exchanged_planes(planes)):
+        if view.verdict in (Verdict.WARN, Verdict.REFUSE) and (exchanged := _exchanged_planes(planes)):
             found.setdefault(exchanged, []).append(name)
     for (one_mm, other_mm), names in found.items():
         yield Doubt(
@@ -32,7 +32,7 @@ def check_plane_order(calibration_set: CalibrationSet, views: Mapping[str, ViewC
         )
 
 
-def exchanged_planes(planes: Sequence[PlaneObservation]) -> tuple[float, float] | None:
+def _exchanged_planes(planes: Sequence[PlaneObservation]) -> tuple[float, float] | None:
     """Positions of the two planes that must be exchanged for the points to fit; None where that explains nothing."""
     places_mm = [float(plane.points_mm[0, 2]) for plane in planes]
     if len(set(places_mm)) < LEAST_PLANES or any(np.ptp(plane.points_mm[:, 2]) > 0 for plane in planes):

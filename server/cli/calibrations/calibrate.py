@@ -29,14 +29,14 @@ def add(verbs: Verbs) -> None:
     )
     parser.add_argument(
         "--origin",
-        type=stated_origin,
+        type=_stated_origin,
         action="append",
         metavar="VIEW@Z=U,V",
         help="where a view of a run sees the target's origin at position Z in mm, if no image shows all of it",
     )
     parser.add_argument(
         "--roll",
-        type=stated_roll,
+        type=_stated_roll,
         action="append",
         metavar="VIEW=DEG",
         help="how a camera of a run is turned about its axis: 180 if it hangs upside down",
@@ -55,7 +55,7 @@ def add(verbs: Verbs) -> None:
     )
 
 
-def stated_origin(text: str) -> tuple[tuple[str, float], tuple[float, float]]:
+def _stated_origin(text: str) -> tuple[tuple[str, float], tuple[float, float]]:
     """View, position in mm and image point of ``VIEW@Z=U,V``."""
     match = re.fullmatch(rf"(.+)@({NUMBER})=({NUMBER}),({NUMBER})", text)
     if not match:
@@ -64,7 +64,7 @@ def stated_origin(text: str) -> tuple[tuple[str, float], tuple[float, float]]:
     return (view, float(z_mm)), (float(u_px), float(v_px))
 
 
-def stated_roll(text: str) -> tuple[str, float]:
+def _stated_roll(text: str) -> tuple[str, float]:
     """View and angle of ``VIEW=DEG``."""
     match = re.fullmatch(rf"(.+)=({NUMBER})", text)
     if not match:

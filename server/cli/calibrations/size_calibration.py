@@ -65,12 +65,12 @@ def size_calibration(options: Namespace) -> Outcome:
     save_size_calibration(found, options.out)
     result = {**found.model_dump(mode="json", by_alias=True), "file": str(options.out), "passed": found.passed}
     if found.passed:
-        return Outcome(result, f"{sizes_table(result)}; measure --sizes {options.out}")
+        return Outcome(result, f"{_sizes_table(result)}; measure --sizes {options.out}")
     result["reason"] = found.reasons[0]
-    return Outcome(result, f"{sizes_table(result)}\n{options.out} failed: {result['reason']}")
+    return Outcome(result, f"{_sizes_table(result)}\n{options.out} failed: {result['reason']}")
 
 
-def sizes_table(result: dict[str, Any]) -> str:
+def _sizes_table(result: dict[str, Any]) -> str:
     """A line per diameter, for people."""
     views = list(result["blurs_px"])
     rows = [

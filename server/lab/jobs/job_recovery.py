@@ -21,7 +21,7 @@ _COMPANIONS = ("-wal", "-shm")
 def opened_table(data_dir: Path, events: EventPublisher) -> Iterator[JobTable]:
     """The table of a data directory, sound and as complete as the directory can make it, until the block ends."""
     path = data_dir / TABLE_FILE
-    if path.exists() and (damage := damage_of(path)):
+    if path.exists() and (damage := _damage_of(path)):
         lost = "finished reconstructions and measurements are found again, what waited must be asked for again"
         set_aside(path, f"table of jobs, {damage}: {lost}", events, _COMPANIONS)
     with closing(JobTable(path)) as table:
@@ -32,7 +32,7 @@ def opened_table(data_dir: Path, events: EventPublisher) -> Iterator[JobTable]:
         yield table
 
 
-def damage_of(path: Path) -> str | None:
+def _damage_of(path: Path) -> str | None:
     """What is wrong with a table; None if nothing is."""
     if path.stat().st_size == 0:
         return "the file is empty"

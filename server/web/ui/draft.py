@@ -236,7 +236,7 @@ def pulse_of(values: dict[str, Any]) -> PulsePair:
     return PulsePair(width_ns=values["width_ns"], separation_ns=values["separation_ns"], current_a=values["current_a"])
 
 
-def recipes_of(values: dict[str, Any]) -> tuple[Recipe, ...]:
+def _recipes_of(values: dict[str, Any]) -> tuple[Recipe, ...]:
     """What is made of every shot by itself."""
     volumes = Recipe(command="reconstruct", settings={"method": values["volumes"]})
     box = (values["droplet_box"] or "").strip()
@@ -267,5 +267,5 @@ def plan_of(values: dict[str, Any], has_stage: bool = True) -> RunPlan:
         stage_z_mm=positions(values["stage_z_mm"]) if moves else (),
         references=tuple(values["references"]) if kind is RunKind.SAMPLE else (),
         calibration=values["calibration"] if kind is RunKind.SAMPLE else None,
-        recipes=recipes_of(values) if kind is RunKind.SAMPLE else None,
+        recipes=_recipes_of(values) if kind is RunKind.SAMPLE else None,
     )

@@ -30,7 +30,7 @@ class ControlChip:
         if self._was_mine and holder is not None and not is_mine:
             ui.notify(f"{holder.who.name} has taken control", type="warning", timeout=0, close_button="OK")
         self._was_mine = is_mine
-        text = control_text(holder, who)
+        text = _control_text(holder, who)
         if text != self._shown:
             self._shown = text
             self._text.set_text(text)
@@ -76,7 +76,7 @@ class ControlChip:
             self._control.take(named)
 
 
-def control_text(holder: Holder | None, who: Visitor) -> str:
+def _control_text(holder: Holder | None, who: Visitor) -> str:
     """What the bar says, in a word or two."""
     if who.role is Role.VIEWER:
         return "viewer"

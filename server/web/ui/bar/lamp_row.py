@@ -27,8 +27,8 @@ class LampRow:
         if texts == self._shown:
             return
         self._shown = texts
-        self._sum.set_text(sum_of(lamps))
-        self._dot.classes(replace=f"lamp {worst_of(lamps)}")
+        self._sum.set_text(_sum_of(lamps))
+        self._dot.classes(replace=f"lamp {_worst_of(lamps)}")
         self._tooltip.set_text("\n".join(texts))
         self._row.clear()
         with self._row:
@@ -36,7 +36,7 @@ class LampRow:
                 _show(lamp, text)
 
 
-def sum_of(lamps: Sequence[Lamp]) -> str:
+def _sum_of(lamps: Sequence[Lamp]) -> str:
     """All lamps in two words."""
     faults = sum(lamp.health is Health.FAULT for lamp in lamps)
     warnings = sum(lamp.health is Health.WARN for lamp in lamps)
@@ -45,7 +45,7 @@ def sum_of(lamps: Sequence[Lamp]) -> str:
     return f"{warnings} of {len(lamps)} amber" if warnings else f"{len(lamps)} ok"
 
 
-def worst_of(lamps: Sequence[Lamp]) -> Health:
+def _worst_of(lamps: Sequence[Lamp]) -> Health:
     """The colour of them all."""
     healths = {lamp.health for lamp in lamps}
     return next((health for health in (Health.FAULT, Health.WARN) if health in healths), Health.OK)

@@ -75,7 +75,7 @@ class ChosenRuns:
         """Show what is chosen, here or in another tab."""
         chosen = self._draft.values["references"]
         _offer(self._references, {run.run_id: _label(run) for run in self._known}, chosen, list(chosen))
-        self._newest.set_visibility(bool(chosen) and set(newest_of(self._known).values()) != set(chosen))
+        self._newest.set_visibility(bool(chosen) and set(_newest_of(self._known).values()) != set(chosen))
         calibration = self._draft.values["calibration"]
         _offer(self._calibration, self._calibrations, [calibration] if calibration else [], calibration)
 
@@ -87,13 +87,13 @@ class ChosenRuns:
         kinds = {run.run_id: run.kind for run in self._known}
         kept = [run_id for run_id in values["references"] if run_id in kinds]
         has = {kinds[run_id] for run_id in kept}
-        pinned = kept + [run_id for kind, run_id in newest_of(self._known).items() if kind not in has]
+        pinned = kept + [run_id for kind, run_id in _newest_of(self._known).items() if kind not in has]
         if sorted(pinned) != sorted(values["references"]):
             self._draft.set("references", pinned)
             self._changed()
 
     def _use_newest(self) -> None:
-        self._draft.set("references", list(newest_of(self._known).values()))
+        self._draft.set("references", list(_newest_of(self._known).values()))
         self.show()
         self._changed()
 
@@ -127,7 +127,7 @@ def known_references(runs: RunStore, chosen: Iterable[str]) -> list[RunSummary]:
     return list(known.values())
 
 
-def newest_of(runs: list[RunSummary]) -> dict[RunKind, str]:
+def _newest_of(runs: list[RunSummary]) -> dict[RunKind, str]:
     """The newest run of each kind, of runs that are listed newest first."""
     return {run.kind: run.run_id for run in reversed(runs) if run.kind in REFERENCE_KINDS}
 

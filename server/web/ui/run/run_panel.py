@@ -58,9 +58,9 @@ class RunPanel:
         self._bar.set_value(status.shots_recorded / max(1, status.shots_planned))
         self._strip.refresh(status.run_id)
         self._counts.set_text(counts_text(status, self._context.desk.state.eta_s))
-        self._waits.set_text(waiting_text(status, time.monotonic()))
+        self._waits.set_text(_waiting_text(status, time.monotonic()))
         self._message.set_text(message_text(status))
-        self._made.set_text(made_text(status))
+        self._made.set_text(_made_text(status))
         self._outcome.set_text(status.outcome.value if status.outcome else "active" if status.active else "")
         self._outcome.props(f"color={outcome_colour(status.outcome)}")
         self._outcome.set_visibility(bool(self._outcome.text))
@@ -96,7 +96,7 @@ def acknowledge_text(status: RunStatus) -> str:
     return f"Acknowledge 1 of {len(waiting)}: {waiting[0].text}" if waiting else "Acknowledge fault"
 
 
-def waiting_text(status: RunStatus, now_s: float) -> str:
+def _waiting_text(status: RunStatus, now_s: float) -> str:
     """What the run waits for, and since when; nothing where it does not wait."""
     waiting = status.waiting
     return f"waits for {waiting.text}, {max(0.0, now_s - waiting.since_s):.1f} s" if waiting and status.active else ""
@@ -119,7 +119,7 @@ def message_text(status: RunStatus) -> str:
     return "" if status.message == status.summary else status.message
 
 
-def made_text(status: RunStatus) -> str:
+def _made_text(status: RunStatus) -> str:
     """What is made of the shots of a spray by itself, as the plan of their run states it."""
     is_of_spray = status.run_id and status.plan and status.plan.kind is RunKind.SAMPLE
     if not is_of_spray or status.plan is None:

@@ -27,7 +27,7 @@ def run_row(run: RunSummary) -> dict[str, Any]:
         "calibration": run.calibration or "",
         "references": ", ".join(run.references),
         "notes": notes_text(run),
-        "picture": f"/api/runs/{run.run_id}/thumbnail.jpg" if has_picture(run) else "",
+        "picture": f"/api/runs/{run.run_id}/thumbnail.jpg" if _has_picture(run) else "",
     }
 
 
@@ -36,7 +36,7 @@ def is_unreadable(run: RunSummary) -> bool:
     return run.outcome in (DAMAGED, PACKED)
 
 
-def has_picture(run: RunSummary) -> bool:
+def _has_picture(run: RunSummary) -> bool:
     """Whether its first shot can be looked at, as far as the list knows."""
     return run.shots_recorded > 0 and not is_unreadable(run)
 
@@ -60,14 +60,14 @@ def run_colour(run: RunSummary) -> str:
 
 def notes_text(run: RunSummary) -> str:
     """Its conditions in a line."""
-    return notes_line(run.notes)
+    return _notes_line(run.notes)
 
 
 def earlier_text(changes: Sequence[NotesChange]) -> str:
     """What stood in its notes before each change, the newest first."""
     told = [
         f"until {local_time(one.at_utc)}, when {one.who} changed it{_spray_told(one.spray)}: "
-        f"{notes_line(one.before) or 'nothing'}"
+        f"{_notes_line(one.before) or 'nothing'}"
         for one in reversed(changes)
     ]
     return "\n".join([*told[:_CHANGES], *([f"and {len(told) - _CHANGES} before"] if len(told) > _CHANGES else [])])
@@ -80,7 +80,7 @@ def _spray_told(spray: Spray | None) -> str:
     return f" and put the orifice at {orifice} mm, the axis along {axis}"
 
 
-def notes_line(notes: RunNotes) -> str:
+def _notes_line(notes: RunNotes) -> str:
     """Conditions in a line."""
     pressure = "" if notes.pressure_bar is None else f"{notes.pressure_bar:g} bar"
     more = [f"{name}: {value}" for name, value in notes.more.items()]
