@@ -47,12 +47,12 @@ def refusals_of_lab(context: Context, plan: RunPlan | None) -> Iterator[Refusal]
     """What the laboratory has against a start; acquisition is asked after it."""
     if not context.services.acquisition.status().active:
         yield from _silent_cameras(context)
-    if plan is not None:
-        yield from _against_cameras(context, plan)
-    if plan is not None and plan.calibration is not None:
+    if plan is None:
+        return
+    yield from _against_cameras(context, plan)
+    if plan.calibration is not None:
         yield from _against_calibration(context, plan.calibration)
-    if plan is not None:
-        yield from against_recipes(context.runs, plan, _calibration_file(context, plan))
+    yield from against_recipes(context.runs, plan, _calibration_file(context, plan))
 
 
 def with_defaults(context: Context, plan: RunPlan) -> RunPlan:
