@@ -9,7 +9,7 @@ import pytest
 import xarray
 from nexusformat.nexus import nxload
 
-from daq.files.run_directory import RunNotes, RunPlan, RunReader, Spray
+from daq.files.run_directory import RunNotes, RunPlan, RunReader, Spray, pack
 from daq.run_plan import PulsePair
 from tests.support.droplet_run import write_run
 
@@ -68,6 +68,14 @@ def test_nexusformat_reads_a_run(run_dir: Path) -> None:
     assert "view1:NXdetector" in root.tree
     data = root["entry/data_view1"]
     np.testing.assert_array_equal(data.nxsignal[0, 1].nxdata, RunReader(run_dir).read_shot(0).views["view1"].frame_b)
+
+
+def test_nexusformat_sees_all_shots_of_a_packed_run(tmp_path: Path) -> None:
+    """Of a run that is not packed it shows one, as the page on file formats says."""
+    write_run(tmp_path / "run", shots=2)
+    pack(tmp_path / "run", tmp_path / "packed.h5")
+    frames = nxload(str(tmp_path / "packed.h5"))["cameras/view1/frames"]
+    np.testing.assert_array_equal(frames[1, 1].nxdata, RunReader(tmp_path / "run").read_shot(1).views["view1"].frame_b)
 
 
 def test_xarray_reads_a_run(run_dir: Path) -> None:
