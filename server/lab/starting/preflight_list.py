@@ -17,9 +17,11 @@ from daq.run.references import REFERENCE_KINDS
 from daq.run.refusals import RefusalCode as Code
 from daq.run.state import RunState
 from daq.run_plan import RunKind, RunPlan
+from processing.calibration.verdict import Verdict
+from server.lab.calibration_story import story_of
 from server.lab.desk.reason import UNSEEN, Reason
 from server.lab.desk.visitor import Visitor
-from server.lab.errors import NotFound
+from server.lab.errors import Damaged, NotFound
 from server.lab.recipes.stated import told_recipes
 from server.lab.services import Context
 from server.lab.starting.readiness import reasons_against_visitor, with_defaults
@@ -175,9 +177,20 @@ def _calibration(context: Context, plan: RunPlan) -> Told | None:
     standing = context.standing
     if standing is not None and standing.calibration == plan.calibration and standing.is_alarm:
         return f"{plan.calibration}: {standing.message}", "calibrate again"
+    if doubt := _doubt(context, plan.calibration):
+        return f"{plan.calibration}: {doubt}", "calibrate again"
     made_s = context.calibrations.made_s(plan.calibration)
     age = "" if made_s is None else f", {_duration(time.time() - made_s)} old"
     return f"{plan.calibration}{age}; fits the images of this rig", ""
+
+
+def _doubt(context: Context, calibration_id: str) -> str:
+    """What a calibration says against itself; empty where it is good, or says nothing that can be read."""
+    try:
+        story = story_of(context, calibration_id)
+    except (NotFound, Damaged):
+        return ""
+    return f"{story.verdict}: {story.remedy}" if story.verdict in (Verdict.WARN, Verdict.REFUSE) else ""
 
 
 def _recipe(_context: Context, plan: RunPlan) -> Told | None:

@@ -1,5 +1,6 @@
 """Pre-flight: everything that is looked at before a run, with figures where it is good and the refusal where not."""
 
+import json
 import re
 import shutil
 
@@ -44,6 +45,14 @@ def test_where_nothing_is_wrong_the_figures_are_told(server: Serving) -> None:
         "no dark run, no background run",
     )
     assert {check.finding for check in found.values()} == {CheckResult.GOOD, CheckResult.WARN}
+
+
+def test_what_a_calibration_says_against_itself_is_told(server: Serving) -> None:
+    use_a_calibration(server)
+    doubted = {"id": "cal", "views": {"view1": {"verdict": "warn", "reasons": ["is pitch_mm right?"]}}}
+    (server.services.data_dir / "calibrations" / "cal.json").write_text(json.dumps(doubted))
+    found = looked_at(server)["Calibration"]
+    assert (found.finding, found.text) == (CheckResult.WARN, "cal: warn: view1: is pitch_mm right?")
 
 
 def test_what_is_wrong_stands_in_its_place_with_a_remedy_and_all_of_it(server: Serving) -> None:
