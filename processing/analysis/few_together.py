@@ -1,10 +1,12 @@
-"""What shots with few droplets say together of their images, which each of them by itself has too few droplets to say.
+"""What shots say together of their images, which each of them by itself has too few droplets to say.
 
-Of shots with more droplets each has been asked by itself.
+Of shots with more droplets each has been asked by itself: whether they look like discs, whether those of B are as large
+as the very same ones of A. Whether all are a little longer than wide is asked of all shots.
 """
 
 import json
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +15,7 @@ from processing.analysis.droplets.droplet_file import DIAMETER, StoredDroplets
 from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS
 from processing.analysis.droplets.shadows.masked_liquid import UNEXPLAINED
 from processing.analysis.droplets.shadows.shadow_light import MANY_UNLIKE
+from processing.analysis.droplets.verdicts.elongation import WRONG, Elongation, elongation_told
 from processing.analysis.unlike_sizes import FEWEST, LEAST_P_PAIR, LONGEST_NS, common_share, unlike_told
 from processing.geometry import FloatArray
 
@@ -21,9 +24,22 @@ SD, RESIDUAL = "diameter_sd_um", "residual"
 
 def few_together(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
     """For people: what is wrong with shapes, or with diameters of B beside A; nothing where nothing says so."""
+    length, is_wrong = elongation_told(_views(shots))
     sized = [shot for shot in shots if {DIAMETER, SD, RESIDUAL} <= shot.columns.keys()]
     told = (_shapes(sized), _sizes(sized))
-    return tuple(f"shots with few droplets together: {what}" for what in told if what)
+    few = (f"shots with few droplets together: {what}" for what in told if what)
+    return (*few, *((f"all shots together: {length}{WRONG if is_wrong else ''}",) if length else ()))
+
+
+def _views(shots: Sequence[StoredDroplets]) -> list[Elongation]:
+    """How long shadows are, by view, of all exposures together; files of older programs do not tell."""
+    told = defaultdict(list)
+    for shot in shots:
+        for exposure in json.loads(str(shot.provenance.get("exposures", "{}"))).values():
+            for name, view in exposure.get("views", {}).items():
+                if longer := view.get("elongation"):
+                    told[name].append(Elongation(**longer))
+    return [Elongation.together(several) for several in told.values()]
 
 
 def _shapes(shots: Sequence[StoredDroplets]) -> str:

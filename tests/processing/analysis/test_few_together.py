@@ -1,6 +1,7 @@
 """Shots with few droplets are as good as they look only if all of them together say nothing else."""
 
 import json
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.verdicts.elongation import Elongation
 from processing.analysis.few_together import few_together
 from processing.analysis.spray.spray_doubts import spray_doubts
 
@@ -38,6 +40,20 @@ def shots(
 @pytest.mark.parametrize(("ratio", "word"), [(0.95, "smaller in exposure B"), (1.05, "larger in exposure B")])
 def test_droplets_that_shrink_or_grow_from_a_to_b_are_told(ratio: float, word: str) -> None:
     assert word in "".join(few_together(shots(ratio=ratio)))
+
+
+@pytest.mark.parametrize(("along_px2", "told"), [(0.0, ""), (0.12, "longer than wide"), (0.4, "are wrong then")])
+def test_few_shadows_of_all_shots_tell_that_they_are_longer_than_wide(along_px2: float, told: str) -> None:
+    """In each shot four of them stand alone."""
+    several = shots(6)
+    for number, shot in enumerate(several):
+        noise_px2 = 0.05 * (-1) ** number
+        seen = Elongation(along_px2 + noise_px2, noise_px2, 0.07, 3.0, 0.64, 4)
+        exposure = {"views": {f"view{view}": {"elongation": asdict(seen)} for view in range(1, 5)}}
+        shot.provenance["exposures"] = json.dumps({"a": {"views": {"view1": {"elongation": None}}}, "b": exposure})
+    what = "".join(few_together(several))
+    assert told in what
+    assert bool(what) is bool(told)
 
 
 def test_figures_of_a_spray_are_doubted() -> None:

@@ -239,7 +239,7 @@ def test_every_shot_that_stands_out_is_checked_one_after_the_other() -> None:
     for shot in range(8):
         made(watch, shot)
     following, *_ = [made(watch, shot, droplets=shot - 6)[0] for shot in range(8, 13)]
-    asked = []
+    asked = list[int]()
     while following is not None:
         assert following.shot is not None
         asked.append(following.shot)

@@ -34,6 +34,7 @@ from processing.analysis.droplets.shadows.shadow_table import sized_droplets
 from processing.analysis.droplets.shadows.shadow_union import union_defects
 from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.analysis.droplets.verdicts.blind_views import blind_verdict, check_images
+from processing.analysis.droplets.verdicts.elongation import Elongation, judged_by_length, lumps_of, seen_elongation
 from processing.analysis.droplets.verdicts.hidden_volume import judged_by_volume
 from processing.analysis.droplets.verdicts.twins import ghosts_within, judged_by_twins, moved
 from processing.analysis.hidden import Hidden
@@ -60,6 +61,8 @@ class SeenShadows:
         Numerical aperture of the light over that of the lens, the same for all views; None: blur is Gaussian.
     light_sd_um : float
         Standard deviation that all diameters share because the light is not known better, the same for all views.
+    elongation : Elongation | None
+        How much longer than wide shadows are; None where few stand alone.
     """
 
     noise: float
@@ -72,6 +75,7 @@ class SeenShadows:
     masked: float
     condenser_ratio: float | None = None
     light_sd_um: float = 0.0
+    elongation: Elongation | None = None
 
 
 ShadowExposure = MeasuredExposure[SizedDroplets, SeenShadows]
@@ -161,7 +165,7 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     seen = seen_by(shot, fit, shadows.transmissions)
     asked = replace(seen, weights=tuple(map(np.multiply, seen.weights, into_grid)))
     ratio = rms_over_noise(asked, shadows.transmissions)
-    views = _seen(fit, search, _masked_shares(fit, into_grid))
+    views = _seen(shot, fit, search, _masked_shares(fit, into_grid))
     verdict, reasons = judged_by_light(shot, fit, search, asked, shadows, ratio)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
@@ -176,7 +180,8 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     lump = lumps(fit.where(known).discs, droplets.residual)
     told = droplets.where(lump < 0).within(search.grid)
     hidden = _hidden(shot, fit, search, known, lump)
-    return MeasuredExposure(told, views, ratio, verdict, reasons, hidden=hidden)
+    exposure = MeasuredExposure(told, views, ratio, verdict, reasons, hidden=hidden)
+    return judged_by_length(exposure, [view.elongation for view in views.values()])
 
 
 def _hidden(
@@ -230,7 +235,9 @@ def _masked_shares(fit: ShadowFit, into_grid: Sequence[NDArray[np.bool_]]) -> li
     return [float(np.mean(mask[chosen])) for mask, chosen in zip(fit.masks, into_grid, strict=True)]
 
 
-def _seen(fit: ShadowFit, search: DropletSearch, masked: Sequence[float]) -> dict[str, SeenShadows]:
+def _seen(
+    shot: Transmissions, fit: ShadowFit, search: DropletSearch, masked: Sequence[float]
+) -> dict[str, SeenShadows]:
     margin = (search.searched.shape[0] - search.grid.shape[0]) // 2
     z_voxel = margin + np.arange(search.grid.shape[0], dtype=np.float64)
     blurs_px = fit.optics.blurs_px(z_voxel)
@@ -247,7 +254,23 @@ def _seen(fit: ShadowFit, search: DropletSearch, masked: Sequence[float]) -> dic
     )
     light = (fit.optics.condenser_ratio, 2000 * fit.light.radius_sd * search.searched.pitch_mm)
     seen = {name: SeenShadows(*row) for name, row in zip(search.names, rows.tolist(), strict=True)}
-    return {name: replace(view, condenser_ratio=light[0], light_sd_um=light[1]) for name, view in seen.items()}
+    longer = zip(seen.items(), _elongations(shot, fit), strict=True)
+    ratio, sd_um = light
+    return {
+        name: replace(view, condenser_ratio=ratio, light_sd_um=sd_um, elongation=one) for (name, view), one in longer
+    }
+
+
+def _elongations(shot: Transmissions, fit: ShadowFit) -> list[Elongation | None]:
+    """Of the shadows of every view."""
+    places, radii_px = fit.discs.positions_voxel, fit.discs.radii_voxel * shot.lattice.pixels_per_voxel
+    known, lumps = shot.masked(fit.masks).trust, lumps_of(places, fit.discs.radii_voxel)
+    blurs_px = fit.optics.blurs_px(0.5 * (shot.lattice.nodes_px.shape[1] - 1) * shot.lattice.spacing)
+    views = zip(shot.images, fit.optics.levels, known, shot.lattice.seen_px(places), blurs_px, strict=True)
+    return [
+        seen_elongation(image / np.float32(level), trust, centres_px, radii_px, lumps, float(blur_px))
+        for image, level, trust, centres_px, blur_px in views
+    ]
 
 
 def _twin_ghosts(
