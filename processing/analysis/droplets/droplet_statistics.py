@@ -25,6 +25,7 @@ P_REAL, NO_P_REAL = (
 NOTHING_COUNTED = "no exposure could be measured"
 _SAME_DROPLETS = ("grid", "margin_voxel", "twins", "seed", "nozzle")
 """Settings that say where droplets are looked for, how ghosts are counted, and where the nozzle is."""
+ALL_HIDDEN = "liquid hides the whole volume, so that no droplet could be seen: measure farther from the nozzle"
 NO_VOLUME = "a file does not say in which volume its droplets were measured"
 
 
@@ -177,6 +178,8 @@ def _density(
     volumes_mm3 = [measured_mm3(shot, exposures) for shot, exposures in counted]
     if None in volumes_mm3:
         return None, NO_VOLUME
+    if not any(volumes_mm3):
+        return None, ALL_HIDDEN
     counts = [len(shot.columns["frame"]) for shot, _ in counted]
     return shots_density(counts, np.array(volumes_mm3, np.float64), per_shot), None
 

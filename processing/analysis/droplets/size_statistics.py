@@ -145,7 +145,8 @@ def shots_density(counts: ArrayLike, volumes_mm3: ArrayLike, exposures_per_shot:
     counted = number_density(int(droplets.sum()), float(measured_mm3.sum()), exposures_per_shot)
 
     def density(taken: FloatArray) -> FloatArray:
-        return (taken @ droplets / (taken @ measured_mm3))[:, None]
+        with np.errstate(invalid="ignore"):  # of draws of shots that are hidden as a whole there is none
+            return (taken @ droplets / (taken @ measured_mm3))[:, None]
 
     (over_shots,) = estimated(density, len(droplets), 1, signed=True)
     if over_shots is None:

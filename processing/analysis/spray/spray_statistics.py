@@ -34,6 +34,7 @@ from processing.analysis.spray.spray_motion import (
 )
 from processing.analysis.spray.spray_sample import SpraySample, spray_sample
 from processing.analysis.velocity.velocity_statistics import velocity_statistics
+from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 
 LIQUIDS_KG_M3 = (50.0, 30_000.0)
@@ -175,10 +176,15 @@ def _in_space(sample: SpraySample, asked: AskedFor) -> tuple[SprayExtent | None,
 def _liquid_ppm(sample: SpraySample) -> Estimate | None:
     def ppm_of(drawn: SpraySample) -> Figures:
         volumes_mm3 = drawn.totals(MM3_PER_UM3 * np.pi / 6 * drawn.cubes_um3[:, None])
-        return lambda counts: np.asarray(1e6 * volumes_mm3(counts) / drawn.measured_mm3(counts))
+        return lambda counts: _ppm(volumes_mm3(counts), drawn.measured_mm3(counts))
 
     (one,) = sample.estimated(ppm_of, signed=sample.has_empty_shots)
     return one and one.within(0.0, np.inf)
+
+
+def _ppm(volumes_mm3: FloatArray, measured_mm3: FloatArray) -> FloatArray:
+    with np.errstate(invalid="ignore"):
+        return np.asarray(1e6 * volumes_mm3 / measured_mm3)
 
 
 def _reasons(sample: SpraySample, proposed: ProposedAxis | None, fits: bool, motion: bool) -> dict[str, str]:

@@ -50,7 +50,7 @@ class _Series:
     def matters(self, before: float, after: float) -> bool:
         if self.least_ratio is None:
             return abs(after - before) > self.least
-        return not 1 / self.least_ratio < after / before < self.least_ratio
+        return max(before, after) > self.least_ratio * min(before, after)
 
 
 def changes_of_spray(sample: SpraySample, axis: SprayAxis | None = None) -> tuple[str, ...]:
@@ -74,13 +74,13 @@ def changes_of_spray(sample: SpraySample, axis: SprayAxis | None = None) -> tupl
 
 def _of_numbers(sample: SpraySample, groups: NDArray[np.intp]) -> Iterator[_Series]:
     """Droplets per volume, which gusts make of any kind, and mean diameters: D10 knows a change sooner than D32."""
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         per_mm3 = np.bincount(groups[sample.shot], minlength=groups[-1] + 1) / np.bincount(groups, sample.volumes_mm3)
     yield _Series("droplets per mm3 are {}", per_mm3, LEAST_RATIO_NUMBER, in_turns=False)
     d_um = sample.diameters_um
     number, length, area, volume = _sums(d_um[:, None] ** np.arange(4), sample, groups).T
     yield _Series("D10 is {} um", length / number, LEAST_RATIO)
-    yield _Series("D32 is {} um", volume / area, LEAST_RATIO)
+    yield _Series("D32 is {} um", volume / area, LEAST_RATIO, in_turns=False)  # single large droplets make heaps
 
 
 def _of_flight(sample: SpraySample, axis: SprayAxis | None, groups: NDArray[np.intp]) -> Iterator[_Series]:

@@ -9,6 +9,7 @@ import pytest
 
 from processing.analysis.copied_shots import in_common
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.droplet_statistics import ALL_HIDDEN
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_statistics import AskedFor, spray_statistics
 from tests.support.sampled_sprays import cone_shots
@@ -164,6 +165,14 @@ def test_an_exposure_that_is_hidden_as_a_whole_leaves_the_others_what_they_are()
     assert told.liquid_ppm
     assert without.liquid_ppm
     assert told.liquid_ppm.value == without.liquid_ppm.value
+
+
+def test_shots_that_are_all_hidden_have_no_density_and_say_why() -> None:
+    hidden = json.dumps({"a": {"verdict": "doubtful", "hidden": {"volume_share": 1.0}}})
+    nobody = [replace(shot, columns={name: one[:0] for name, one in shot.columns.items()}) for shot in SHOTS]
+    told = spray_statistics([saying(shot, exposures=hidden) for shot in nobody]).droplets
+    assert told.number_density_per_mm3 is None
+    assert told.number_density_reason == ALL_HIDDEN
 
 
 def test_shots_of_different_conditions_are_told() -> None:

@@ -97,6 +97,10 @@ def test_three_shots_tell_no_change() -> None:
     assert not told(sample(shots=3, faster=lambda shot: 1.0 + shot))
 
 
+def test_a_spray_that_is_not_there_at_first_is_told() -> None:
+    assert "droplets per mm3 are 0 in the first 4 shots, " in told(sample(more=lambda shot: float(shot > 3)))
+
+
 def test_shots_without_droplets_or_velocities_are_no_hindrance() -> None:
     one = sample(more=lambda shot: 0.0 if shot == 3 else 1.0, faster=lambda shot: 1.3 if shot > 4 else 1.0)
     assert "speed is 15" in told(one)
