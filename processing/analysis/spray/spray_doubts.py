@@ -51,18 +51,18 @@ def spray_doubts(
     proposed : ProposedAxis | None
         What the droplets say of it.
     """
-    seen = axis or (proposed.believed if proposed else None)
+    lingering = lingering_told(shots)
     return (
         *exposure_doubts(shots),
         *few_together(shots),
         *velocity_doubts(shots),
         *copies_told(shots),
-        *lingering_told(shots),
+        *lingering,
         *depth_doubts(shots),
         *_of_conditions(shots),
         *_of_boxes(shots),
         *(_of_equals(sample) if sample else ()),
-        *(changes_of_spray(sample, seen) if sample and len(sample) else ()),
+        *(_of_changes(sample, axis, proposed) if sample and not lingering else ()),
         *(_of_motion(sample, axis) if sample else ()),
         *(_of_pressure(shots, sample) if sample else ()),
         *(axis_doubts(sample, axis, proposed) if sample and axis and len(sample) else ()),
@@ -104,6 +104,11 @@ def _of_equals(sample: SpraySample) -> Iterator[str]:
     velocities_m_s = sample.velocities_m_s[sample.paired]
     if len(velocities_m_s) >= FEWEST and all(map(all_alike, velocities_m_s.T)):
         yield f"all {len(velocities_m_s)} velocities are the very same: nothing is measured so; intervals have no width"
+
+
+def _of_changes(sample: SpraySample, axis: SprayAxis | None, proposed: ProposedAxis | None) -> tuple[str, ...]:
+    """Of shots that are samples of their own: those that show the same droplets differ less than samples do."""
+    return changes_of_spray(sample, axis or (proposed.believed if proposed else None)) if len(sample) else ()
 
 
 def _of_motion(sample: SpraySample, axis: SprayAxis | None) -> Iterator[str]:

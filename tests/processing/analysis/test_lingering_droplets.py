@@ -7,7 +7,9 @@ import pytest
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.lingering_droplets import lingering_told
+from processing.analysis.spray.spray_sample import spray_sample
 from processing.analysis.spray.spray_statistics import spray_statistics
+from processing.analysis.spray.steadiness import changes_of_spray
 from processing.runs.sprays.measured_spray import read_compared
 from tests.support.sampled_sprays import cone_shots, stored_shot, write_results
 
@@ -43,6 +45,13 @@ def test_a_series_in_time_is_no_sample_of_many_shots(count: int, way_mm: float, 
 
 def test_statistics_doubt_the_limits_of_such_shots() -> None:
     assert SAME in "".join(spray_statistics(series(40, 0.2, shots=3)).doubts)
+
+
+def test_such_shots_are_not_told_as_a_spray_that_changes() -> None:
+    """Their figures drift as droplets come and go: chance is that of few droplets, not that of shots."""
+    slow = series(60, 0.2, shots=20)
+    assert changes_of_spray(spray_sample(slow))
+    assert "changes over its shots" not in "".join(spray_statistics(slow).doubts)
 
 
 def test_droplets_all_alike_and_dirt_that_stays_are_told() -> None:
