@@ -63,7 +63,7 @@ def _shapes(shots: Sequence[StoredDroplets]) -> str:
 def _sizes(shots: Sequence[StoredDroplets]) -> str:
     pairs = [few for shot in shots if len(few := _pairs(shot)) < FEWEST]
     separations_ns = [ns for shot in shots if (ns := _separation_ns(shot)) is not None]
-    if sum(map(len, pairs)) < FEWEST or max(separations_ns) > LONGEST_NS:
+    if sum(map(len, pairs)) < FEWEST or max(separations_ns, default=math.inf) > LONGEST_NS:
         return ""
     before_um, after_um, before_sd_um, after_sd_um = np.concatenate(pairs).T
     common = math.hypot(common_share(before_sd_um, before_um), common_share(after_sd_um, after_um))

@@ -83,7 +83,7 @@ def seen_elongation(
         Standard deviation of the blur.
     """
     centres_px, reaches_px = _whole(centres_px, radii_px, lumps, blur_px)
-    alone = _alone(centres_px, reaches_px, blur_px + 1)
+    alone = _alone(centres_px, reaches_px)
     told = [_moments(image, trust, centres_px[one], reaches_px[one]) for one in alone[:: -(-len(alone) // MOST) or 1]]
     rows = np.array([one for one in told if one is not None]).reshape(-1, 3)
     if len(rows) < FEWEST:
@@ -152,11 +152,11 @@ def _whole(
     return whole, reaches_px + 3 * blur_px + 1
 
 
-def _alone(centres_px: FloatArray, reaches_px: FloatArray, slack_px: float) -> Labels:
-    """Which are reached by no other one, but for the last of its blur."""
+def _alone(centres_px: FloatArray, reaches_px: FloatArray) -> Labels:
+    """Which are reached by no other one: neighbours, which may stand in a row, would make them longer."""
     pairs = cKDTree(centres_px).query_pairs(2 * float(reaches_px.max(initial=0)), output_type="ndarray")
     apart = np.linalg.norm(centres_px[pairs[:, 0]] - centres_px[pairs[:, 1]], axis=1)
-    return np.setdiff1d(np.arange(len(centres_px)), pairs[apart < reaches_px[pairs].sum(axis=1) - slack_px])
+    return np.setdiff1d(np.arange(len(centres_px)), pairs[apart < reaches_px[pairs].sum(axis=1)])
 
 
 def _moments(image: Image, trust: Image, centre_px: FloatArray, reach_px: float) -> tuple[float, float, float] | None:
