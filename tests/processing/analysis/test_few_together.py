@@ -32,7 +32,10 @@ def shots(
             "partner": np.where(partner < droplets, partner + droplets, partner - droplets),
             "p_pair": np.full(2 * droplets, 0.99),
         }
-        provenance: dict[str, str | int | float] = {"velocity": json.dumps({"separation_ns": separation_ns})}
+        provenance: dict[str, str | int | float] = {
+            "velocity": json.dumps({"separation_ns": separation_ns}),
+            "settings": "{}",
+        }
         several.append(StoredDroplets(columns, provenance))
     return several
 
