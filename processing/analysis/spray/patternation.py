@@ -28,6 +28,8 @@ LEAST_COVERED = 0.5
 """Of a cell, for its liquid to be known."""
 FEWEST = 20
 """Droplets of a patternation."""
+NARROWEST_MM = 1e-6
+"""Of droplets that are all on the axis."""
 
 
 class Patternation(FrozenValue):
@@ -86,7 +88,7 @@ def patternation(
     if len(chosen) < FEWEST or sample.box_mm is None:
         return None
     _, radius_mm, azimuth_deg = axis.coordinates(chosen.points_mm)
-    ring_edges_mm = np.linspace(0, np.nextafter(radius_mm.max(), np.inf), rings + 1)
+    ring_edges_mm = np.linspace(0, max(np.nextafter(radius_mm.max(), np.inf), NARROWEST_MM), rings + 1)
     sector_edges_deg = np.linspace(0, 360, sectors + 1)
     ring = np.searchsorted(ring_edges_mm, radius_mm, side="right") - 1
     cell = ring * sectors + np.minimum((azimuth_deg * sectors / 360).astype(int), sectors - 1)

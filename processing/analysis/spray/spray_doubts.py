@@ -11,6 +11,7 @@ import numpy as np
 from processing.analysis.copied_shots import copies_told
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import measured_grid
+from processing.analysis.estimates import Figures
 from processing.analysis.few_together import few_together
 from processing.analysis.lingering_droplets import lingering_told
 from processing.analysis.near_or_far import depth_doubts
@@ -22,12 +23,17 @@ from processing.analysis.spray.spray_motion import FEWEST, all_alike
 from processing.analysis.spray.spray_sample import SpraySample, box_told
 from processing.analysis.spray.steadiness import changes_of_spray
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
+from processing.geometry import FloatArray
 
 NO_CONDITIONS = ("operator", "remark", "more")
 """Of the notes, what may differ in one spray; what is in ``more`` is looked at by its own names."""
 NOT_STATED = "not stated"
 LIGHTEST_KG_M3, PA_PER_BAR = 600.0, 1e5
 """Of what is liquid at room temperature: it leaves a nozzle the fastest."""
+SIZES, FEWEST_OF_SIZES = 8, 100
+"""Classes of diameters, of equal numbers; droplets with a velocity."""
+MOST_BY_SIZES, SURE = 0.02, 0.99
+"""Of the mean speed."""
 MOST_ASIDE_DEG = 45.0
 """Of the mean velocity from the axis; a spray flies along its axis, however wide it is."""
 
@@ -64,6 +70,7 @@ def spray_doubts(
         *(_of_equals(sample) if sample else ()),
         *(_of_changes(sample, axis, proposed) if sample and not lingering else ()),
         *(_of_motion(sample, axis) if sample else ()),
+        *(_of_unpaired(sample) if sample else ()),
         *(_of_pressure(shots, sample) if sample else ()),
         *(axis_doubts(sample, axis, proposed) if sample and axis and len(sample) else ()),
     )
@@ -127,6 +134,38 @@ def _of_motion(sample: SpraySample, axis: SprayAxis | None) -> Iterator[str]:
             f"droplets fly {aside_deg:.0f} degrees from the axis, in the mean: is it stated rightly, and are exposures "
             "A and B exchanged? Figures along the axis are of another direction"
         )
+
+
+def _of_unpaired(sample: SpraySample) -> Iterator[str]:
+    """Whether droplets without a velocity are of other sizes, which fly faster or slower, than those that have one."""
+    paired = sample.paired
+    if np.count_nonzero(paired) < FEWEST_OF_SIZES or paired.all():
+        return
+    speeds_m_s = np.where(paired, np.linalg.norm(np.nan_to_num(sample.velocities_m_s), axis=1), 0.0)
+    place = np.argsort(np.argsort(sample.diameters_um, kind="stable"), kind="stable")
+    of_class = np.eye(SIZES)[place * SIZES // len(sample)]
+    columns = np.hstack([of_class, of_class * paired[:, None], of_class * speeds_m_s[:, None]])
+
+    def ratio_of(drawn: SpraySample) -> Figures:
+        sums = drawn.totals(columns)
+        return lambda counts: _by_all_sizes(sums(counts))
+
+    (ratio,) = sample.estimated(ratio_of, signed=True, confidence=SURE)
+    if ratio and abs(ratio.value - 1) > MOST_BY_SIZES and not ratio.low <= 1 <= ratio.high:
+        mean_m_s = float(speeds_m_s.sum() / np.count_nonzero(paired))
+        yield (
+            f"{100 * np.mean(~paired):.0f} % of the droplets have no velocity, and are of other sizes than those that "
+            f"have one: the mean speed is {mean_m_s:.3g} m/s of these, but {ratio.value * mean_m_s:.3g} m/s if all of "
+            "a size fly alike; mean velocities and flux are of those that have one"
+        )
+
+
+def _by_all_sizes(sums: FloatArray) -> FloatArray:
+    """Mean speed of all, if those of a size fly alike, over that of those with a velocity, (rows, 1)."""
+    n, paired, speeds = np.split(sums, 3, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        by_size = (n * speeds / paired).sum(axis=1) / n.sum(axis=1)
+        return np.asarray(by_size * paired.sum(axis=1) / speeds.sum(axis=1))[:, None]
 
 
 def _of_pressure(shots: Sequence[StoredDroplets], sample: SpraySample) -> Iterator[str]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from processing.analysis.copied_shots import in_common
 from processing.analysis.droplets.droplet_file import StoredDroplets
@@ -202,3 +203,22 @@ def test_shots_of_two_boxes_are_told() -> None:
     told = doubts(other, *SHOTS[1:])
     assert "shots were measured in 2 boxes (x -5 to 7, y 8 to 12, z -5 to 5 mm; x -5 to 5, y 8" in told
     assert "densities, flux and sizes are means over both places" in told
+
+
+def losing(shot: StoredDroplets, which: NDArray[np.bool_]) -> StoredDroplets:
+    """Without the velocities of some droplets."""
+    lost = {name: np.where(which, np.nan, shot.columns[name]) for name in ("u_m_s", "v_m_s", "w_m_s")}
+    return replace(shot, columns={**shot.columns, **lost})
+
+
+def test_velocities_that_large_droplets_lack_are_told_with_what_they_would_make() -> None:
+    """Large ones fly faster: without two thirds of them the mean speed is 3 % too small."""
+    rng, shots = np.random.default_rng(3), cone_shots(1, 6, 300)
+    d_um = [np.asarray(one.columns["diameter_um"], float) for one in shots]
+    large = [rng.random(len(one)) < 2 / 3 * (one > 50) for one in d_um]
+    told = doubts(*map(losing, shots, large))
+    true = np.mean(5 + np.concatenate(d_um) / 10)
+    assert "have no velocity, and are of other sizes" in told
+    assert float(told.split(" but ")[1].split()[0]) == pytest.approx(true, rel=0.01)
+    by_chance = [rng.random(len(one)) < 0.4 for one in d_um]
+    assert not doubts(*map(losing, shots, by_chance))
