@@ -20,7 +20,7 @@ from typing import Annotated, Literal, TypeVar
 import numpy as np
 from pydantic import Field
 
-from processing.analysis.droplets.shadows.light.fringes import Fringes
+from processing.analysis.droplets.shadows.light.fringes import LEAST_FRINGES, Fringes
 from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS, SURE, UNSURE, SeenLight
 from processing.coherent_light import MOST_RATIO
 from processing.geometry import FloatArray
@@ -87,9 +87,8 @@ def seen_light(relit: Callable[[float | None], Relit], *, resolved: bool = True)
     if len(blurred.squares) < LEAST_DROPLETS:
         return SeenLight()
     tried = {ratio: relit(ratio) for ratio in FIRST_TRIED}
-    first = tried[_best(tried)]
-    if (share := _share(first, blurred)) <= UNSURE and not _fit_alike(blurred, first):
-        return SeenLight(None, share)
+    if _is_blur(tried, blurred):
+        return SeenLight(None, _share(tried[_best(tried)], blurred))
     while unknown := [ratio for ratio in _next_ratios(tried) if ratio not in tried]:
         tried |= {ratio: relit(ratio) for ratio in unknown}
     best, alike = tried[_best(tried)], _alike(tried, blurred)
@@ -97,7 +96,7 @@ def seen_light(relit: Callable[[float | None], Relit], *, resolved: bool = True)
     share, other_sd = _share(best, blurred), abs(float(np.median(best.radii - blurred.radii))) / np.sqrt(3)
     if fringes is not None and not fringes.seen and resolved:
         return SeenLight(None, share, other_sd, fringes)
-    if not (fringes and fringes.seen) and not (resolved and _sure(share, len(best.squares))):
+    if not (fringes and fringes.seen) and not (resolved and _is_sure(best, blurred)):
         return SeenLight(None, min(share, 0.5 * (UNSURE + SURE)), other_sd)
     ratio, radius_sd = _middle(tried, alike)
     return SeenLight(ratio, _share(tried[ratio], blurred), radius_sd, fringes)
@@ -115,9 +114,18 @@ def _share(relit: Relit, blurred: Relit) -> float:
     return float(np.mean(relit.squares < blurred.squares))
 
 
-def _sure(share: float, droplets: int) -> bool:
-    """Whether that many speak for a light, and more than by chance (two standard deviations of a half)."""
-    return bool(share >= max(SURE, 0.5 + 1 / np.sqrt(droplets)))
+def _is_blur(tried: Mapping[float, Relit], blurred: Relit) -> bool:
+    """Whether a Gaussian blur is better for sure, and the images do not rather show the fringes of the next best."""
+    best = _best(tried)
+    worse = _share(tried[best], blurred) <= UNSURE and not _fit_alike(blurred, tried[best])
+    fringes = _asked({best: tried[best]})
+    return worse and (fringes is None or fringes.share <= LEAST_FRINGES)
+
+
+def _is_sure(best: Relit, blurred: Relit) -> bool:
+    """Whether most droplets speak for a light, by votes or by what it leaves more than by chance."""
+    share = _share(best, blurred)
+    return share >= SURE and bool(share >= 0.5 + 1 / np.sqrt(len(best.squares)) or not _fit_alike(best, blurred))
 
 
 def _fit_alike(better: Relit, other: Relit, floor: float = 0.0) -> bool:

@@ -125,6 +125,8 @@ THERE = Fringes(0.9, 0.1)
         (LOST, 30, None, "fringes would tell, and are lost in noise"),
         (LOST, 15, None, "fringes would tell, and are lost in noise"),
         (FEW, 0, None, ""),
+        (THERE, 0, 0.8, ""),
+        (LOST, 0, None, "fringes would tell, and are lost in noise"),
     ],
 )
 def test_light_from_few_directions_is_believed_where_its_fringes_are_seen(
