@@ -9,12 +9,12 @@ from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
+from processing.analysis.droplets.shadows.black_level import black_doubts
 from processing.analysis.droplets.shadows.light.fringes import fringes_of
 from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS, without_fringes
 from processing.analysis.droplets.shadows.masked_liquid import UNEXPLAINED
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise
-from processing.analysis.droplets.shadows.veiled_shadows import veil_doubts
 from processing.analysis.droplets.verdicts.explained_images import RatioLimits, judged
 
 LIMITS = RatioLimits(trusted=1.25, refused=2.0)
@@ -77,8 +77,8 @@ def judged_by_light(
     beside_px = dict(zip(search.names, np.hypot(*fit.optics.shifts_px.T).tolist(), strict=True))
     limits = COHERENT_LIMITS if (fit.optics.condenser_ratio or FRINGELESS) < FRINGELESS else LIMITS
     verdict, reasons = judged(beside_px, ratio, bare, limits)
-    veiled = grey(asked, shadows) or veil_doubts(shot, search, fit)
-    doubts = (*veiled, *_fringe_doubts(asked, shadows), *fit.light.doubts(len(fit.discs)))
+    black = grey(asked, shadows) or black_doubts(shot, search, fit)
+    doubts = (*black, *_fringe_doubts(asked, shadows), *fit.light.doubts(len(fit.discs)))
     if doubts and verdict is ShotVerdict.GOOD:
         verdict = ShotVerdict.DOUBTFUL
     return verdict, (*reasons, *doubts)

@@ -74,13 +74,21 @@ def test_a_black_level_without_a_dark_image_is_doubted(scene: ShadowScene) -> No
     assert any("of the light is left where shadows should be black" in reason for reason in doubted.reasons)
 
 
+def test_a_dark_image_that_is_too_bright_is_doubted(scene: ShadowScene) -> None:
+    """It is taken off images and background alike: shadows are below black, and droplets look larger."""
+    excess = np.float32(0.07)
+    told = measure_shadows([(image - excess) / (1 - excess) for image in scene.images], search_of(scene, MARGIN_VOXEL))
+    assert told.verdict is ShotVerdict.DOUBTFUL
+    assert "% of the light below black" in "".join(told.reasons)
+
+
 @pytest.fixture(scope="module")
 def small() -> ShadowScene:
     """Droplets of about two pixels, behind a blur of more than one: none is black in its middle."""
     return shadow_scene(SHAPE, 14, IMAGE_SIZE_PX, seed=3, median_mm=0.035, blurs_px=(1.2,) * 4, noise=0.0)
 
 
-@pytest.mark.parametrize(("veil", "doubted"), [(0.0, False), (0.2, True), (0.5, True)])
+@pytest.mark.parametrize(("veil", "doubted"), [(0.0, False), (0.06, True), (0.2, True), (0.5, True)])
 def test_a_veil_of_light_over_small_droplets_is_doubted(small: ShadowScene, veil: float, doubted: bool) -> None:
     """Stray light, or a second exposure that shows no droplet there: each looks smaller, and none looks odd."""
     rng = np.random.default_rng(4)
