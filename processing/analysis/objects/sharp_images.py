@@ -7,7 +7,7 @@ all everywhere, and looks like the image once it is blurred (Jansson's constrain
 import cv2
 import numpy as np
 
-from processing.analysis.droplets.shadows.disc_optics import edge_blur_px, slopes_of
+from processing.analysis.droplets.shadows.discs.disc_optics import edge_blur_px, slopes_of
 from processing.preprocessing import Intensity
 
 ROUNDS = 10

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.shadows.disc_profiles import DiscProfiles
+from processing.analysis.droplets.shadows.discs.disc_profiles import DiscProfiles
 from processing.analysis.droplets.shadows.shadow_light import BLACK
 from processing.analysis.reticle.elliptic_dots import Ellipse, elliptic_dot
 from processing.geometry import FloatArray

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from processing.analysis.droplets.shadows.disc_profiles import DiscProfiles
+from processing.analysis.droplets.shadows.discs.disc_profiles import DiscProfiles
 from processing.geometry import FloatArray
 
 ROUNDS = 4

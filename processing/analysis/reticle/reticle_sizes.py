@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
-from processing.analysis.droplets.shadows.disc_profiles import disc_profiles
+from processing.analysis.droplets.shadows.discs.disc_optics import first_disc_optics
+from processing.analysis.droplets.shadows.discs.disc_profiles import disc_profiles
 from processing.analysis.droplets.shadows.light.light_search import Light, Relit, seen_light, stated_ratio
 from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS, SeenLight, light_doubts
 from processing.analysis.droplets.shadows.shadow_light import BLACK_PIXELS, MOST_LEFT

@@ -7,7 +7,7 @@ import pytest
 
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict
-from processing.analysis.droplets.shadows.shadow_shot import SeenShadows
+from processing.analysis.droplets.shadows.seen_shadows import SeenShadows
 from processing.runs.droplets.measured_shot import Exposure, compared, shot_velocities
 from processing.runs.shots.separation import Separation
 from processing.volume import VoxelGrid

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from processing.analysis.droplets.droplet_search import DropletSearch
+from processing.analysis.droplets.shadows.discs.opaque_discs import Discs
 from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS
-from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from processing.analysis.droplets.shadows.shadow_rounds import ShadowRounds
 from processing.geometry import FloatArray
@@ -22,8 +22,8 @@ STEP = 0.08
 LOWEST, HIGHEST = -2, 5
 """Steps that are tried at most."""
 MOST = 0.03
-"""Of the light: mean diameters are 1.5 % wrong then. Of simulated shots in any light -0.02 to 0.013 is told where black is black,
-to 0.01."""
+"""Of the light: mean diameters are 1.5 % wrong then. Of simulated shots, in any light, -0.02 to 0.01 is told where
+black is black."""
 SURE = 2.0
 """Standard deviations."""
 DRAWS = 100

@@ -14,7 +14,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from processing.analysis.droplets.shadows.opaque_discs import DiscOptics, Discs
+from processing.analysis.droplets.shadows.discs.opaque_discs import DiscOptics, Discs
 from processing.analysis.droplets.sight_lattice import SightLattice
 from processing.geometry import FloatArray
 

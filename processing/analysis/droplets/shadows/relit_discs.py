@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from processing.analysis.droplets.shadows.disc_profiles import disc_profiles
-from processing.analysis.droplets.shadows.opaque_discs import Discs
+from processing.analysis.droplets.shadows.discs.disc_profiles import disc_profiles
+from processing.analysis.droplets.shadows.discs.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit
 
 LEAST_SIZE, MOST_SIZE = 0.75, 1.33

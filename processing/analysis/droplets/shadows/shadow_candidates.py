@@ -9,7 +9,7 @@ import numpy as np
 from processing.analysis.droplets.candidates import candidates
 from processing.analysis.droplets.droplet_search import Window
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.shadows.opaque_discs import DiscImages
+from processing.analysis.droplets.shadows.discs.opaque_discs import DiscImages
 from processing.geometry import FloatArray
 from processing.reconstruction.planning.plan import Plan
 

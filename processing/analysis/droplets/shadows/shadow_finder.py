@@ -17,10 +17,10 @@ from dataclasses import replace
 import numpy as np
 
 from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
-from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
+from processing.analysis.droplets.shadows.discs.disc_optics import first_disc_optics
+from processing.analysis.droplets.shadows.discs.opaque_discs import Discs
 from processing.analysis.droplets.shadows.light.light_search import Light, stated_ratio
 from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS, SeenLight, told_otherwise
-from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_candidates import Stage
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from processing.analysis.droplets.shadows.shadow_rounds import ShadowRounds

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_search import Window
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.image_noise import LEAST_NOISE, noise_of
+from processing.analysis.droplets.shadows.discs.opaque_discs import DiscImages, DiscOptics, Discs
 from processing.analysis.droplets.shadows.light.seen_light import STATED, SeenLight
 from processing.analysis.droplets.shadows.masked_liquid import Mask
-from processing.analysis.droplets.shadows.opaque_discs import DiscImages, DiscOptics, Discs
 from processing.analysis.droplets.sight_lattice import SightLattice
 from processing.geometry import FloatArray
 

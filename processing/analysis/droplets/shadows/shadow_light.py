@@ -10,10 +10,10 @@ from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
 from processing.analysis.droplets.shadows.black_level import black_doubts
+from processing.analysis.droplets.shadows.discs.opaque_discs import DiscImages, Shadows
 from processing.analysis.droplets.shadows.light.fringes import fringes_of
 from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS, without_fringes
 from processing.analysis.droplets.shadows.masked_liquid import UNEXPLAINED
-from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise
 from processing.analysis.droplets.verdicts.explained_images import RatioLimits, judged
 

@@ -10,21 +10,21 @@ from scipy.spatial import cKDTree
 from processing.analysis.droplets.candidates import foremost
 from processing.analysis.droplets.droplet_search import CANDIDATE_PITCH_VOXEL, DropletSearch, keep_on
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.shadows.disc_optics import refined_disc_optics
-from processing.analysis.droplets.shadows.disc_supports import DiscSupports, supporting_views, undisputed
-from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views
-from processing.analysis.droplets.shadows.light.fringes import fringes_of
-from processing.analysis.droplets.shadows.light.light_search import LEAST_BLUR_PX, Relit, larger_than_stated, seen_light
-from processing.analysis.droplets.shadows.light.seen_light import SeenLight
-from processing.analysis.droplets.shadows.masked_liquid import liquid_masks, liquid_objects
-from processing.analysis.droplets.shadows.merged_discs import merged_discs
-from processing.analysis.droplets.shadows.opaque_discs import (
+from processing.analysis.droplets.shadows.discs.disc_optics import refined_disc_optics
+from processing.analysis.droplets.shadows.discs.disc_supports import DiscSupports, supporting_views, undisputed
+from processing.analysis.droplets.shadows.discs.merged_discs import merged_discs
+from processing.analysis.droplets.shadows.discs.opaque_discs import (
     NO_DISC,
     DiscImages,
     DiscOptics,
     Discs,
     Sweeps,
 )
+from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views
+from processing.analysis.droplets.shadows.light.fringes import fringes_of
+from processing.analysis.droplets.shadows.light.light_search import LEAST_BLUR_PX, Relit, larger_than_stated, seen_light
+from processing.analysis.droplets.shadows.light.seen_light import SeenLight
+from processing.analysis.droplets.shadows.masked_liquid import liquid_masks, liquid_objects
 from processing.analysis.droplets.shadows.relit_discs import relit
 from processing.analysis.droplets.shadows.shadow_candidates import Stage, shadow_peaks
 from processing.analysis.droplets.shadows.shadow_fit import (

@@ -1,7 +1,7 @@
 """Shadows of one exposure, measured: droplets with their sizes, what the views look like, and whether to believe it."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, found_by_class, matches, pooled
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict, told_real
 from processing.analysis.droplets.reality import twins_of
+from processing.analysis.droplets.shadows.discs.opaque_discs import DiscImages, Discs
 from processing.analysis.droplets.shadows.judged_volume import (
     beside_what_is_not_known,
     is_judged,
@@ -21,7 +22,7 @@ from processing.analysis.droplets.shadows.judged_volume import (
 from processing.analysis.droplets.shadows.light.light_search import Light
 from processing.analysis.droplets.shadows.light.seen_light import SeenLight
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
-from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs
+from processing.analysis.droplets.shadows.seen_shadows import SeenShadows, seen_shadows
 from processing.analysis.droplets.shadows.shadow_finder import (
     behind_gaussian_blur,
     find_shadows,
@@ -34,49 +35,11 @@ from processing.analysis.droplets.shadows.shadow_table import sized_droplets
 from processing.analysis.droplets.shadows.shadow_union import union_defects
 from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.analysis.droplets.verdicts.blind_views import blind_verdict, check_images
-from processing.analysis.droplets.verdicts.elongation import Elongation, judged_by_length, lumps_of, seen_elongation
+from processing.analysis.droplets.verdicts.elongation import judged_by_length
 from processing.analysis.droplets.verdicts.hidden_volume import judged_by_volume
 from processing.analysis.droplets.verdicts.twins import ghosts_within, judged_by_twins, moved
 from processing.analysis.hidden import Hidden
 from processing.kernels import DEFAULT_THREADS
-
-
-@dataclass(frozen=True)
-class SeenShadows:
-    """What a view of an exposure looks like.
-
-    Parameters
-    ----------
-    noise, level : float
-        Standard deviation of the noise of a pixel, and transmission without droplets.
-    blur_px, focus_z_mm : float
-        Standard deviation of the blur where it is least, and where that is.
-    most_blur_px : float
-        Where it is largest within the grid.
-    shift_u_px, shift_v_px : float
-        How far the image lies beside its calibration, apart from a common motion of all.
-    masked : float
-        Share of the pixels into the grid that look through liquid that is no droplet.
-    condenser_ratio : float | None
-        Numerical aperture of the light over that of the lens, the same for all views; None: blur is Gaussian.
-    light_sd_um : float
-        Standard deviation that all diameters share because the light is not known better, the same for all views.
-    elongation : Elongation | None
-        How much longer than wide shadows are; None where few stand alone.
-    """
-
-    noise: float
-    level: float
-    blur_px: float
-    focus_z_mm: float
-    most_blur_px: float
-    shift_u_px: float
-    shift_v_px: float
-    masked: float
-    condenser_ratio: float | None = None
-    light_sd_um: float = 0.0
-    elongation: Elongation | None = None
-
 
 ShadowExposure = MeasuredExposure[SizedDroplets, SeenShadows]
 
@@ -165,7 +128,7 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     seen = seen_by(shot, fit, shadows.transmissions)
     asked = replace(seen, weights=tuple(map(np.multiply, seen.weights, into_grid)))
     ratio = rms_over_noise(asked, shadows.transmissions)
-    views = _seen(shot, fit, search, _masked_shares(fit, into_grid))
+    views = seen_shadows(shot, fit, search, into_grid)
     verdict, reasons = judged_by_light(shot, fit, search, asked, shadows, ratio)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
@@ -227,50 +190,6 @@ def _recorded(shot: Transmissions) -> DiscImages:
 def _counted(numbers: NDArray[np.intp]) -> int:
     """How many objects are numbered, from 0."""
     return int(numbers.max(initial=-1)) + 1
-
-
-def _masked_shares(fit: ShadowFit, into_grid: Sequence[NDArray[np.bool_]]) -> list[float]:
-    if not fit.masks:
-        return [0.0] * len(into_grid)
-    return [float(np.mean(mask[chosen])) for mask, chosen in zip(fit.masks, into_grid, strict=True)]
-
-
-def _seen(
-    shot: Transmissions, fit: ShadowFit, search: DropletSearch, masked: Sequence[float]
-) -> dict[str, SeenShadows]:
-    margin = (search.searched.shape[0] - search.grid.shape[0]) // 2
-    z_voxel = margin + np.arange(search.grid.shape[0], dtype=np.float64)
-    blurs_px = fit.optics.blurs_px(z_voxel)
-    rows = np.column_stack(
-        [
-            fit.noises,
-            fit.optics.levels,
-            blurs_px.min(axis=1),
-            search.grid.z_mm[blurs_px.argmin(axis=1)],
-            blurs_px.max(axis=1),
-            fit.optics.shifts_px,
-            masked,
-        ]
-    )
-    light = (fit.optics.condenser_ratio, 2000 * fit.light.radius_sd * search.searched.pitch_mm)
-    seen = {name: SeenShadows(*row) for name, row in zip(search.names, rows.tolist(), strict=True)}
-    longer = zip(seen.items(), _elongations(shot, fit), strict=True)
-    ratio, sd_um = light
-    return {
-        name: replace(view, condenser_ratio=ratio, light_sd_um=sd_um, elongation=one) for (name, view), one in longer
-    }
-
-
-def _elongations(shot: Transmissions, fit: ShadowFit) -> list[Elongation | None]:
-    """Of the shadows of every view."""
-    places, radii_px = fit.discs.positions_voxel, fit.discs.radii_voxel * shot.lattice.pixels_per_voxel
-    known, lumps = shot.masked(fit.masks).trust, lumps_of(places, fit.discs.radii_voxel)
-    blurs_px = fit.optics.blurs_px(0.5 * (shot.lattice.nodes_px.shape[1] - 1) * shot.lattice.spacing)
-    views = zip(shot.images, fit.optics.levels, known, shot.lattice.seen_px(places), blurs_px, strict=True)
-    return [
-        seen_elongation(image / np.float32(level), trust, centres_px, radii_px, lumps, float(blur_px))
-        for image, level, trust, centres_px, blur_px in views
-    ]
 
 
 def _twin_ghosts(

@@ -5,9 +5,9 @@ import numpy as np
 from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.reality import Evidence, Reality, crowding
-from processing.analysis.droplets.shadows.disc_supports import DiscSupports, supporting_views
+from processing.analysis.droplets.shadows.discs.disc_supports import DiscSupports, supporting_views
+from processing.analysis.droplets.shadows.discs.opaque_discs import DiscImages, Shadows
 from processing.analysis.droplets.shadows.judged_volume import knowing_views
-from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Shadows
 from processing.analysis.droplets.shadows.shadow_finder import COHERENT_SHARE
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from processing.analysis.droplets.size_correction import SizeCorrection

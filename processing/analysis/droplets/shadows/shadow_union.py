@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.shadows.disc_profiles import OPACITY
-from processing.analysis.droplets.shadows.opaque_discs import DiscImages, DiscOptics, Discs
+from processing.analysis.droplets.shadows.discs.disc_profiles import OPACITY
+from processing.analysis.droplets.shadows.discs.opaque_discs import DiscImages, DiscOptics, Discs
 from processing.geometry import FloatArray
 from processing.kernels import _native
 

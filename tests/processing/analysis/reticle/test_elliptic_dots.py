@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from processing.analysis.droplets.shadows.coherent_discs import BLURS_PER_AIRY
-from processing.analysis.droplets.shadows.disc_profiles import disc_profiles
+from processing.analysis.droplets.shadows.discs.coherent_discs import BLURS_PER_AIRY
+from processing.analysis.droplets.shadows.discs.disc_profiles import disc_profiles
 from processing.analysis.reticle.elliptic_dots import Ellipse, elliptic_dot
 from processing.coherent_light import CORE_SIGMA
 from tests.support.reticle_scenes import AIRY_PX, PER_AIRY, SIZE, ellipse_image

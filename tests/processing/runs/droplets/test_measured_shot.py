@@ -7,7 +7,7 @@ import numpy as np
 
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict
-from processing.analysis.droplets.shadows.shadow_shot import SeenShadows
+from processing.analysis.droplets.shadows.seen_shadows import SeenShadows
 from processing.analysis.hidden import Hidden
 from processing.runs.droplets.measured_shot import shot_summary
 

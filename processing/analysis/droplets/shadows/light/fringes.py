@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Shadows
+from processing.analysis.droplets.shadows.discs.opaque_discs import DiscImages, Shadows
 
 FREE, BRIGHTER = 0.0005, 0.001
 """Light beyond 1 that counts as none, and as a fringe's."""

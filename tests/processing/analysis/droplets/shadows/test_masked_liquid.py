@@ -9,8 +9,8 @@ from processing.analysis.cells import measured_shares
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import matches
 from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.analysis.droplets.shadows.discs.opaque_discs import Discs
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
-from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.analysis.spray.spray_sample import bounds_mm
 from processing.geometry import FloatArray, PinholeCamera

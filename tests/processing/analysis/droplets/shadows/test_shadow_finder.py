@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from processing.analysis.droplets.ghost_share import matches
-from processing.analysis.droplets.shadows.disc_optics import (
+from processing.analysis.droplets.shadows.discs.disc_optics import (
     LEAST_BLUR_PX,
     MOST_BLUR_PX,
     first_disc_optics,
     held_variances,
 )
-from processing.analysis.droplets.shadows.disc_supports import DiscSupports, supporting_views, undisputed
-from processing.analysis.droplets.shadows.merged_discs import merged_discs
-from processing.analysis.droplets.shadows.opaque_discs import Discs
+from processing.analysis.droplets.shadows.discs.disc_supports import DiscSupports, supporting_views, undisputed
+from processing.analysis.droplets.shadows.discs.merged_discs import merged_discs
+from processing.analysis.droplets.shadows.discs.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_finder import find_shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from tests.support.shadow_scenes import BLURS_PX, ShadowScene, search_of, shadow_scene

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.shadows.disc_profiles import OPACITY
+from processing.analysis.droplets.shadows.discs.disc_profiles import OPACITY
 from processing.analysis.droplets.shadows.shadow_union import united
 from processing.kernels import _native
 from tests.support.shadow_scenes import united_shadow

@@ -5,8 +5,8 @@ import pytest
 from scipy.ndimage import gaussian_filter
 from scipy.special import j1
 
-from processing.analysis.droplets.shadows.coherent_discs import BLURS_PER_AIRY, CORE_SHARE, coherent_discs
-from processing.analysis.droplets.shadows.disc_profiles import disc_profiles
+from processing.analysis.droplets.shadows.discs.coherent_discs import BLURS_PER_AIRY, CORE_SHARE, coherent_discs
+from processing.analysis.droplets.shadows.discs.disc_profiles import disc_profiles
 from processing.coherent_light import CORE_SIGMA, circles, waves
 from tests.support.abbe import PER_AIRY, SIZE, abbe
 

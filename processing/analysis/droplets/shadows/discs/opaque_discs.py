@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.shadows.disc_profiles import disc_profiles
-from processing.analysis.droplets.shadows.disc_supports import DiscSupports
+from processing.analysis.droplets.shadows.discs.disc_profiles import disc_profiles
+from processing.analysis.droplets.shadows.discs.disc_supports import DiscSupports
 from processing.analysis.droplets.sight_lattice import SightLattice
 from processing.geometry import FloatArray
 from processing.kernels import _native

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import ncx2
 
-from processing.analysis.droplets.shadows.disc_profiles import OPACITY, opacity
-from processing.analysis.droplets.shadows.opaque_discs import DiscImages, DiscOptics, Discs, Sweeps
+from processing.analysis.droplets.shadows.discs.disc_profiles import OPACITY, opacity
+from processing.analysis.droplets.shadows.discs.opaque_discs import DiscImages, DiscOptics, Discs, Sweeps
 from processing.analysis.droplets.sight_lattice import sight_lattice
 from processing.geometry import FloatArray
 from processing.studies.simulated_droplets import study_cameras, study_grid

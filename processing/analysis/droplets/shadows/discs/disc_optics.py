@@ -7,7 +7,7 @@ import numpy as np
 
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.point_spread import without_motion
-from processing.analysis.droplets.shadows.opaque_discs import DiscImages, DiscOptics, Discs
+from processing.analysis.droplets.shadows.discs.opaque_discs import DiscImages, DiscOptics, Discs
 from processing.geometry import FloatArray
 
 STEEPEST = 0.9995

@@ -8,11 +8,11 @@ import pytest
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import matches
 from processing.analysis.droplets.measured_exposure import ShotVerdict
-from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
+from processing.analysis.droplets.shadows.discs.disc_optics import first_disc_optics
+from processing.analysis.droplets.shadows.discs.opaque_discs import Discs
 from processing.analysis.droplets.shadows.light.fringes import Fringes
 from processing.analysis.droplets.shadows.light.light_search import NamedLight, Relit, seen_light
 from processing.analysis.droplets.shadows.light.seen_light import SeenLight
-from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.relit_discs import relit
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit
 from processing.analysis.droplets.shadows.shadow_shot import measure_shadows

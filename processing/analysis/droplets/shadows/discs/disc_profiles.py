@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import i0e, i1e
 
-from processing.analysis.droplets.shadows.coherent_discs import coherent_discs
+from processing.analysis.droplets.shadows.discs.coherent_discs import coherent_discs
 from processing.geometry import FloatArray
 from processing.kernels import _native
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from processing.analysis.droplets.candidates import close_pairs
-from processing.analysis.droplets.shadows.opaque_discs import Discs
+from processing.analysis.droplets.shadows.discs.opaque_discs import Discs
 
 SAME_VOXEL, SAME_RADII = 1.0, 0.6
 """A droplet that is closer to a larger one, or by so many radii of it, is the same."""

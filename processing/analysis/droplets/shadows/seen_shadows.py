@@ -1,0 +1,101 @@
+"""What the views of an exposure of shadows look like: noise, blur, shifts, light, masks, elongation."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.analysis.droplets.droplet_search import DropletSearch
+from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
+from processing.analysis.droplets.verdicts.elongation import Elongation, lumps_of, seen_elongation
+
+
+@dataclass(frozen=True)
+class SeenShadows:
+    """What a view of an exposure looks like.
+
+    Parameters
+    ----------
+    noise, level : float
+        Standard deviation of the noise of a pixel, and transmission without droplets.
+    blur_px, focus_z_mm : float
+        Standard deviation of the blur where it is least, and where that is.
+    most_blur_px : float
+        Where it is largest within the grid.
+    shift_u_px, shift_v_px : float
+        How far the image lies beside its calibration, apart from a common motion of all.
+    masked : float
+        Share of the pixels into the grid that look through liquid that is no droplet.
+    condenser_ratio : float | None
+        Numerical aperture of the light over that of the lens, the same for all views; None: blur is Gaussian.
+    light_sd_um : float
+        Standard deviation that all diameters share because the light is not known better, the same for all views.
+    elongation : Elongation | None
+        How much longer than wide shadows are; None where few stand alone.
+    """
+
+    noise: float
+    level: float
+    blur_px: float
+    focus_z_mm: float
+    most_blur_px: float
+    shift_u_px: float
+    shift_v_px: float
+    masked: float
+    condenser_ratio: float | None = None
+    light_sd_um: float = 0.0
+    elongation: Elongation | None = None
+
+
+def seen_shadows(
+    shot: Transmissions, fit: ShadowFit, search: DropletSearch, into_grid: Sequence[NDArray[np.bool_]]
+) -> dict[str, SeenShadows]:
+    """What the views look like, by name.
+
+    Parameters
+    ----------
+    shot, fit, search : Transmissions, ShadowFit, DropletSearch
+        What was recorded, what is known of it, and where droplets were looked for.
+    into_grid : sequence of (rows, columns) bool arrays
+        Pixels of each view that look into the grid.
+    """
+    margin = (search.searched.shape[0] - search.grid.shape[0]) // 2
+    z_voxel = margin + np.arange(search.grid.shape[0], dtype=np.float64)
+    blurs_px = fit.optics.blurs_px(z_voxel)
+    rows = np.column_stack(
+        [
+            fit.noises,
+            fit.optics.levels,
+            blurs_px.min(axis=1),
+            search.grid.z_mm[blurs_px.argmin(axis=1)],
+            blurs_px.max(axis=1),
+            fit.optics.shifts_px,
+            _masked_shares(fit, into_grid),
+        ]
+    )
+    light = (fit.optics.condenser_ratio, 2000 * fit.light.radius_sd * search.searched.pitch_mm)
+    seen = {name: SeenShadows(*row) for name, row in zip(search.names, rows.tolist(), strict=True)}
+    longer = zip(seen.items(), _elongations(shot, fit), strict=True)
+    ratio, sd_um = light
+    return {
+        name: replace(view, condenser_ratio=ratio, light_sd_um=sd_um, elongation=one) for (name, view), one in longer
+    }
+
+
+def _masked_shares(fit: ShadowFit, into_grid: Sequence[NDArray[np.bool_]]) -> list[float]:
+    if not fit.masks:
+        return [0.0] * len(into_grid)
+    return [float(np.mean(mask[chosen])) for mask, chosen in zip(fit.masks, into_grid, strict=True)]
+
+
+def _elongations(shot: Transmissions, fit: ShadowFit) -> list[Elongation | None]:
+    """Of the shadows of every view."""
+    places, radii_px = fit.discs.positions_voxel, fit.discs.radii_voxel * shot.lattice.pixels_per_voxel
+    known, lumps = shot.masked(fit.masks).trust, lumps_of(places, fit.discs.radii_voxel)
+    blurs_px = fit.optics.blurs_px(0.5 * (shot.lattice.nodes_px.shape[1] - 1) * shot.lattice.spacing)
+    views = zip(shot.images, fit.optics.levels, known, shot.lattice.seen_px(places), blurs_px, strict=True)
+    return [
+        seen_elongation(image / np.float32(level), trust, centres_px, radii_px, lumps, float(blur_px))
+        for image, level, trust, centres_px, blur_px in views
+    ]
