@@ -36,7 +36,10 @@ FALLING_ROUNDS, AGAIN_ROUNDS = 8, 3
 COHERENT_SHARE = 0.02
 """Of a diameter: what is wrong in any light that shows, common to the droplets of a shot."""
 CONTRADICTED = 2.0
-"""Of such shares, by which diameters in a stated light differ from those in the light that shows."""
+"""Standard deviations by which diameters differ from those in the light that shows: by such a share of them, and by
+what the light is not known to."""
+FEWEST_AGAINST = 4
+"""Droplets that can contradict a light: so few must all do so."""
 PURGES, SETTLED = 6, 0.003
 """So often at most disputed droplets are dropped and found anew; it ends when the others stay as many, about."""
 
@@ -80,17 +83,24 @@ def find_shadows(
 
 
 def light_contradicted(
-    shot: Transmissions, search: DropletSearch, fit: ShadowFit, before_round: Callable[[], None]
+    shot: Transmissions, search: DropletSearch, fit: ShadowFit, light: Light, before_round: Callable[[], None]
 ) -> tuple[str, ...]:
-    """What speaks against a light that was stated: droplets that tell another one for sure, with other diameters."""
+    """What speaks against a light that was stated, or told by other shots: droplets that surely tell another one.
+
+    Of one that these droplets told themselves nothing is said, nor where diameters hardly differ.
+    """
+    if len(fit.discs) < FEWEST_AGAINST or (light == "estimated" and len(fit.discs) >= LEAST_DROPLETS):
+        return ()
     finder = ShadowRounds(shot, search, before_round)
-    seen, stated = finder.light(fit), fit.optics.condenser_ratio
-    if not len(fit.discs) or seen.doubts(len(fit.discs)):
+    seen, stated = finder.light(fit, FEWEST_AGAINST), fit.optics.condenser_ratio
+    if seen.doubts(max(len(fit.discs), LEAST_DROPLETS)):
         return ()
     larger = finder.larger_than_stated(fit, seen.condenser_ratio)
-    if abs(larger) <= CONTRADICTED * COHERENT_SHARE * np.median(fit.discs.radii_voxel):
+    known_voxel = np.hypot(COHERENT_SHARE * np.median(fit.discs.radii_voxel), fit.light.radius_sd)
+    if abs(larger) <= CONTRADICTED * known_voxel:
         return ()
-    return (told_otherwise(stated, seen.condenser_ratio, 2000 * larger * search.searched.pitch_mm),)
+    off_um = 2000 * larger * search.searched.pitch_mm
+    return (told_otherwise(stated, seen.condenser_ratio, off_um, by_others=light == "estimated"),)
 
 
 def behind_gaussian_blur(shot: Transmissions, search: DropletSearch, fit: ShadowFit) -> FloatArray:

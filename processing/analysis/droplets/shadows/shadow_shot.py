@@ -99,8 +99,8 @@ def measure_shadows(
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind)
     fit = find_shadows(shot, search, light, before_round, known_light)
     told = judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes)))
-    if light != "estimated" and told.verdict is ShotVerdict.GOOD:
-        told = told.doubted(light_contradicted(shot, search, fit, before_round))
+    if told.verdict is ShotVerdict.GOOD:
+        told = told.doubted(light_contradicted(shot, search, fit, light, before_round))
     told = told_real(told)
     count = twins_of(twins, len(images), search.lattice.directions)
     if not count or told.verdict is not ShotVerdict.GOOD:

@@ -74,3 +74,12 @@ def test_a_damaged_shot_has_no_vote_and_harms_no_other(tmp_path: Path) -> None:
     with RunReader(run_dir) as run:
         shot = RunMeasurement.of(run, 2, calibration_file, settings).measure(2, tmp_path / "droplets", 1)
     assert shot.summary.verdict is ShotVerdict.GOOD
+
+
+def test_a_shot_in_another_light_than_the_first_ones_is_doubted(tmp_path: Path) -> None:
+    """Its few droplets do not vote, but they contradict what those of the first shots say."""
+    scenes = [*(few(seed, sharp=False) for seed in (1, 2, 3, 4)), few(5, sharp=True)]
+    alike, other = measured(tmp_path, scenes, (3, 4))
+    assert 0 < other.summary.droplets < 10
+    assert (alike.summary.verdict, other.summary.verdict) == (ShotVerdict.GOOD, ShotVerdict.DOUBTFUL)
+    assert "first shots" in other.summary.reasons[-1]

@@ -73,7 +73,9 @@ class Relit:
     fringes: Fringes | None = None
 
 
-def seen_light(relit: Callable[[float | None], Relit], *, resolved: bool = True) -> SeenLight:
+def seen_light(
+    relit: Callable[[float | None], Relit], *, resolved: bool = True, fewest: int = LEAST_DROPLETS
+) -> SeenLight:
     """The light that explains most droplets best.
 
     Parameters
@@ -82,9 +84,11 @@ def seen_light(relit: Callable[[float | None], Relit], *, resolved: bool = True)
         Of a condenser ratio, or None for a Gaussian blur: the droplets in that light.
     resolved : bool
         Whether pixels are fine enough to tell without fringes; else droplets can only be unsure of such light.
+    fewest : int
+        Of fewer droplets nothing is told.
     """
     blurred = relit(None)
-    if len(blurred.squares) < LEAST_DROPLETS:
+    if len(blurred.squares) < fewest:
         return SeenLight()
     tried = {ratio: relit(ratio) for ratio in FIRST_TRIED}
     if _is_blur(tried, blurred):

@@ -86,12 +86,14 @@ def without_fringes(fringes: Fringes, wrong: str) -> str:
     )
 
 
-def told_otherwise(stated: float | None, seen: float | None, off_um: float) -> str:
-    """Why a light that was stated is doubted: droplets tell another one, in which diameters differ by so much."""
+def told_otherwise(stated: float | None, seen: float | None, off_um: float, *, by_others: bool) -> str:
+    """Why a light is doubted that was stated, or told by other shots: droplets tell another, with other diameters."""
     names = [
         "behind a Gaussian blur" if ratio is None else f"in light of {ratio:g} apertures" for ratio in (stated, seen)
     ]
+    told = "by the first shots of the run, droplets are" if by_others else "droplets are stated to be"
+    remedy = "measure shots in one light apart from the others" if by_others else "leave it out, and droplets tell"
     return (
-        f"droplets are stated to be seen {names[0]}, and look as {names[1]}, where diameters are {abs(off_um):.1f} um "
-        f"{'larger' if off_um > 0 else 'smaller'}: state --light as the rig has it, or leave it out, and droplets tell"
+        f"{told} seen {names[0]}, and these look as {names[1]}, where diameters are {abs(off_um):.1f} um "
+        f"{'larger' if off_um > 0 else 'smaller'}: state --light as the rig has it, or {remedy}"
     )
