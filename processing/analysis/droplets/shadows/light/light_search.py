@@ -42,8 +42,9 @@ LEAST_BLUR_PX = 0.6
 """Of views in the mean: pixels that are wider leave edges by which a Gaussian blur looks like light."""
 ALIKE, ALIKE_SD = 0.02, 2.0
 """Lights leave alike where logarithms of what they leave differ by less than such a share of what the best one gains
-over a Gaussian blur, in the mean of the droplets: theory and lenses differ by as much. Or by less than so many standard
-deviations of that mean."""
+over a Gaussian blur, in the mean of the droplets: theory and lenses differ by as much. Or, where they gain little, of
+what noise leaves: droplets of one size look nearly alike in all lights. Or by less than so many standard deviations of
+that mean."""
 DRAWS = 200
 """Of droplets with replacement."""
 
@@ -141,7 +142,7 @@ def _fit_alike(better: Relit, other: Relit, floor: float = 0.0) -> bool:
 def _alike(tried: Mapping[Ratio, Relit], blurred: Relit) -> dict[Ratio, Relit]:
     """The lights that leave as little as the best one, as far as that can be told; that one among them."""
     best = tried[_best(tried)]
-    floor = ALIKE * float(np.mean(_logs(blurred) - _logs(best)))
+    floor = ALIKE * max(1.0, float(np.mean(_logs(blurred) - _logs(best))))
     return {ratio: one for ratio, one in tried.items() if one is best or _fit_alike(best, one, floor)}
 
 

@@ -98,13 +98,18 @@ def test_a_stated_light_that_droplets_contradict_is_doubted(ratio: float, stated
 VALLEYS = {8.0: 2.0, 3.0: 3.0, 1.8: 3.0, 1.3: 1.5, 1.15: 3.0}
 
 
-@pytest.mark.parametrize(("gain", "sd"), [(1.0, 0.0), (60.0, 11.5)])
-def test_the_deeper_of_two_valleys_is_taken_and_how_far_the_other_one_lies_is_told(gain: float, sd: float) -> None:
-    """In one radii are larger by 20; where valleys differ by little of what both gain, either may be the light."""
+@pytest.mark.parametrize(("unit", "gain", "sd"), [(0.1, 1.0, 0.0), (0.1, 60.0, 11.5), (0.02, 1.0, 11.5)])
+def test_the_deeper_of_two_valleys_is_taken_and_how_far_the_other_one_lies_is_told(
+    unit: float, gain: float, sd: float
+) -> None:
+    """In one radii are larger by 20; either may be the light where valleys differ by little of what both gain.
+
+    Or of what noise leaves, where both gain little.
+    """
 
     def in_light(other: float | None) -> Relit:
         left = 5.0 + gain * (other is None) if other not in VALLEYS else VALLEYS[other]
-        return Relit(np.full(30, np.exp(0.1 * left)), np.full(30, 20.0 * (other == 8)), Fringes())
+        return Relit(np.full(30, np.exp(unit * left)), np.full(30, 20.0 * (other == 8)), Fringes())
 
     seen = seen_light(in_light)
     assert seen.condenser_ratio == pytest.approx(1.3)
