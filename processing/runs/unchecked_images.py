@@ -16,7 +16,8 @@ PROPORTION = {
     "shadow": Unchecked(
         "whether grey values are in proportion to light: a gamma near to 1 fits shadows that are a little smaller or "
         "larger; one that is far from 1 is told where droplets are wider than their blur, or look veiled",
-        "gamma 1 in the settings of the cameras, or --sizes: dots of known diameters, seen by the same cameras",
+        "gamma 1 in the settings of the cameras, and a dark image; or --sizes: dots of known diameters, seen by the "
+        "same cameras",
     ),
 }
 SCALE = Unchecked(

@@ -34,6 +34,9 @@ MOST_LEFT = 0.04
 MANY_UNLIKE = 1 / 8
 """Of the droplets, around which more is left than round opaque discs leave. Simulated shots of up to 28 per mm^3 have 0
 to 10 %, 19 to 75 % where droplets move by two pixels or more while light is on, or are there twice."""
+UNLIKE_BLURS = 1.4
+"""Blur of the widest view over that of the sharpest, in light that shows: diffraction by like lenses is as wide in all.
+Two of four lenses out of focus, at 1.5 and 1.8, made diameters 7 and 9 um too large, and the light another one."""
 LEAST_KNOWN = 0.1
 """Share of the pixels of a view of which something must be known."""
 
@@ -78,7 +81,8 @@ def judged_by_light(
     limits = COHERENT_LIMITS if (fit.optics.condenser_ratio or FRINGELESS) < FRINGELESS else LIMITS
     verdict, reasons = judged(beside_px, ratio, bare, limits)
     black = grey(asked, shadows) or black_doubts(shot, search, fit)
-    doubts = (*black, *_fringe_doubts(asked, shadows), *fit.light.doubts(len(fit.discs)))
+    unlike = _unlike_blurs(fit, search.names, 0.5 * search.searched.shape[0])
+    doubts = (*black, *unlike, *_fringe_doubts(asked, shadows), *fit.light.doubts(len(fit.discs)))
     if doubts and verdict is ShotVerdict.GOOD:
         verdict = ShotVerdict.DOUBTFUL
     return verdict, (*reasons, *doubts)
@@ -104,6 +108,19 @@ def grey(seen: DiscImages, shadows: Shadows) -> tuple[str, ...]:
         f"{100 * share:.0f} % of the light is left where shadows should be black, limit {100 * MOST_LEFT:.0f} %: is a "
         "dark image missing (the camera's black level), are grey values not in proportion to light (gamma), or are "
         "droplets not opaque? Diameters are wrong then",
+    )
+
+
+def _unlike_blurs(fit: ShadowFit, names: Sequence[str], z_voxel: float) -> tuple[str, ...]:
+    """What speaks against one light for all views; empty where none shows, or all are about as sharp."""
+    blurs_px = fit.optics.blurs_px(z_voxel)
+    sharpest, widest = int(blurs_px.argmin()), int(blurs_px.argmax())
+    if fit.optics.condenser_ratio is None or blurs_px[widest] <= UNLIKE_BLURS * blurs_px[sharpest]:
+        return ()
+    return (
+        f"{names[widest]} is blurred by {blurs_px[widest]:.2f} px and {names[sharpest]} by {blurs_px[sharpest]:.2f}, "
+        f"limit {UNLIKE_BLURS:g} times: is a lens out of focus, or its aperture another one? One light is taken for "
+        "all views, and diameters may be 10 um wrong: focus, or measure without that view",
     )
 
 

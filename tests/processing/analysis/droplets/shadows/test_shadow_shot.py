@@ -147,6 +147,23 @@ def test_few_droplets_that_move_or_noise_are_no_light_from_few_directions(per_mm
     assert told.droplets.diameters_um.mean() == pytest.approx(1000 * sharp.diameters_mm.mean(), rel=0.03)
 
 
+def test_two_lenses_out_of_focus_are_no_other_light() -> None:
+    """One light is taken for all views: in the one that explains both kinds diameters would be 5 um larger."""
+    rng, grid, ways_px = (
+        np.random.default_rng(1),
+        study_grid(SHAPE),
+        np.argwhere(np.hypot(*np.mgrid[-2:3, -2:3]) < 2.2) - 2,
+    )
+    scene = size_scene(SizeCase(10, condenser_ratio=1.2), grid, IMAGE_SIZE_PX, np.random.default_rng(5))
+    images = list(scene.images)
+    for view in (0, 2):
+        blurred = np.mean([np.roll(images[view], way, axis=(0, 1)) for way in ways_px], axis=0)
+        images[view] = (blurred + rng.normal(0, 0.011, blurred.shape)).astype(np.float32)
+    told = measure_shadows(images, plan_droplets(scene.believed, grid, margin_voxel=MARGIN_VOXEL))
+    assert told.verdict is ShotVerdict.DOUBTFUL, told.droplets.diameters_um.mean()
+    assert any("is a lens out of focus, or its aperture another one" in reason for reason in told.reasons)
+
+
 def test_pixels_too_coarse_to_tell_the_light_do_not_tell_it() -> None:
     """Edges sharper than a pixel look like light of 0.8 apertures, in which diameters would be 6 um too small."""
     coarse = shadow_scene(SHAPE, 14, IMAGE_SIZE_PX, seed=2, blurs_px=(0.3,) * 4)
