@@ -9,6 +9,8 @@ MOST_SHIFT_PX = 0.3
 """Views that lie farther beside their calibration are refused."""
 EVEN, MOSTLY = 1.05, 0.9
 """Where more than so many times the noise is left, so large a share of what views see must be explained by droplets."""
+SMOOTHED = "were images resampled, filtered or taken in colour, so that neighbouring pixels share their noise"
+"""Noise is told by how neighbours differ: what is left would be noise, too."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,8 @@ def _refusals(beside_px: Mapping[str, float], ratio: float, limit: float) -> tup
     if ratio >= limit:
         return (
             f"droplets explain the images to {ratio:.2f} times the noise only, limit {limit}: do calibration and views "
-            "belong together (tomoshadow check), is the spray too dense, or are droplets seen outside of what was "
-            "searched?",
+            "belong together (tomoshadow check), is the spray too dense, are droplets seen outside of what was "
+            f"searched, or {SMOOTHED}?",
         )
     return tuple(
         f"{name} lies {shift_px:.2f} px beside its calibration, limit {MOST_SHIFT_PX} px: correct it by the droplets "
@@ -70,7 +72,7 @@ def _doubt(ratio: float, bare: float, limit: float) -> str:
     if ratio >= limit:
         return (
             f"droplets explain the images to {ratio:.2f} times the noise, more than {limit}: how many are ghosts "
-            "cannot be told"
+            f"cannot be told; or {SMOOTHED}?"
         )
     if ratio < EVEN or (share := (bare**2 - ratio**2) / (bare**2 - 1)) >= MOSTLY:
         return ""

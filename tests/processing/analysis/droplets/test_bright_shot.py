@@ -249,6 +249,13 @@ def test_where_droplets_do_not_explain_the_images_nobody_is_sent_to_calibrate_ag
     assert ["calibrate again" in reason for reason in reasons] == [False]
 
 
+@pytest.mark.parametrize("ratio", [1.2, 1.6])
+def test_images_whose_pixels_share_their_noise_are_asked_for(ratio: float) -> None:
+    """Of images that were resampled, what is left is noise: neither calibration nor spray is to blame."""
+    (reason,) = judged({"view1": 0.0}, ratio, 9.0, RatioLimits(trusted=1.05, refused=1.5))[1]
+    assert "resampled" in reason
+
+
 def test_what_a_view_does_not_see_is_not_empty(truth: BrightScene, shot: BrightExposure) -> None:
     """A box four times as wide as the images: number density is of what could be measured, and the shot says so."""
     wide = VoxelGrid.centred((*GRID.shape[:2], 4 * GRID.shape[2]), GRID.pitch_mm)
