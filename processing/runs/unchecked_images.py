@@ -99,6 +99,20 @@ def stated_rate(rate_hz: float) -> Unchecked:
     )
 
 
+def even_rows(spacing_mm: float | None) -> list[Unchecked]:
+    """Of droplets that move, and stand so far apart in rows; None: in none."""
+    if spacing_mm is None:
+        return []
+    return [
+        Unchecked(
+            f"whether droplets fly {spacing_mm:.2g} mm more or less: so far apart they stand in even rows, and were "
+            "all of them one spacing farther on, everything would look the same",
+            "nothing where they fly by less than half of that in between; else a shorter time, which must tell the "
+            "same velocities",
+        )
+    ]
+
+
 def unchecked_images(
     polarity: Polarity,
     *,

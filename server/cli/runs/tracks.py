@@ -11,6 +11,7 @@ from server.cli.output import Outcome, progress
 from server.cli.runs.export_option import add_export
 
 if TYPE_CHECKING:
+    from processing.analysis.droplets.droplet_file import StoredDroplets
     from processing.analysis.velocity.track_table import DropletTracks
 
 KEPT = ("run", "run_created_utc", "calibration", "calibration_sha256", "grid", "recipe_sha256", "tomoshadow")
@@ -59,16 +60,18 @@ def tracks(options: Namespace) -> Outcome:
     )
     for export in options.export:
         export_tracks(options.out, export)
-    result = _told(linked, len(shots), options.out)
+    result = _told(linked, shots, options.out)
     return Outcome(result, _summary(result))
 
 
-def _told(linked: "DropletTracks", shots: int, file: Path) -> dict[str, Any]:
-    from processing.runs.unchecked_images import stated_rate, told_unchecked
+def _told(linked: "DropletTracks", shots: "list[StoredDroplets]", file: Path) -> dict[str, Any]:
+    from processing.analysis.even_rows import row_spacing_mm
+    from processing.runs.unchecked_images import even_rows, stated_rate, told_unchecked
 
+    unchecked = [stated_rate(linked.rate_hz), *even_rows(row_spacing_mm(shots))] if linked.tracks else []
     return {
         "tracks": linked.tracks,
-        "shots": shots,
+        "shots": len(shots),
         "droplets": linked.droplets,
         "share_tracked": linked.share_tracked,
         "median_length": linked.median_length,
@@ -77,7 +80,7 @@ def _told(linked: "DropletTracks", shots: int, file: Path) -> dict[str, Any]:
         "noise_curve": linked.noise_curve.plain() if linked.noise_curve else None,
         "reason": linked.reason,
         "doubts": list(linked.doubts),
-        "not_checked": told_unchecked([stated_rate(linked.rate_hz)] if linked.tracks else [], progress),
+        "not_checked": told_unchecked(unchecked, progress),
         "file": str(file),
         "passed": linked.tracks > 0,
     }

@@ -16,6 +16,7 @@ def tell_unchecked(
     settings: "MeasureSettings",
     shots: "list[ShotDroplets]",
     sights: dict[str, int],
+    row_spacing_mm: float | None,
 ) -> list[dict[str, str]]:
     """Tell what nothing checks in the droplets of a run, and what to state so that it is; once for all its shots."""
     from daq.files.run_directory import RunReader
@@ -24,7 +25,7 @@ def tell_unchecked(
     from processing.calibration.sets.recorded_set import nominal_scales
     from processing.reconstruction.planning.calibrated_plan import default_grid
     from processing.runs.shots.turned_views import reversed_shows_px
-    from processing.runs.unchecked_images import told_unchecked, unchecked_images, unknown_crop
+    from processing.runs.unchecked_images import even_rows, told_unchecked, unchecked_images, unknown_crop
 
     with RunReader(run_dir) as run:
         cropped = unknown_crop(run.header)
@@ -43,4 +44,5 @@ def tell_unchecked(
         shallow=reversed_shows_px(calibration, grid) < CLOSE_PX,
         sparse=not depth_known(sights) and not depth_reversed(sights),
     )
-    return told_unchecked([*unchecked, *cropped], progress)
+    rows = even_rows(row_spacing_mm) if any(shot.velocity and shot.velocity.pairs for shot in shots) else []
+    return told_unchecked([*unchecked, *rows, *cropped], progress)

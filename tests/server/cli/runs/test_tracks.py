@@ -11,6 +11,7 @@ import pytest
 
 from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_columns, write_droplets
 from processing.analysis.droplets.droplet_table import Droplets
+from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.track_file import read_tracks
 from processing.analysis.velocity.track_table import track_droplets
 from processing.reconstruction.settings import GridSettings
@@ -41,6 +42,23 @@ def write_series(folder: Path, shown: Series, missing: tuple[int, ...] = (), **m
         provenance = {"run": "spray", "shot": number + 3, "grid": GridSettings.of(GRID).model_dump_json(), **more}
         write_droplets(folder / f"shot_{number + 3:05d}_droplets.h5", {"a": droplets}, provenance)
     return folder
+
+
+def test_rows_that_look_the_same_one_spacing_farther_on_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Droplets 30 voxels apart that fly by 34 from shot to shot are taken for such that fly by 4."""
+    rng, shown = np.random.default_rng(5), series(frames=6)
+    starts = np.array([(20, 0, 10), (50, 7, 40), (80, 16, 25)])
+    frames = []
+    for number in range(6):
+        rows = (starts[:, None] + np.outer(np.arange(-7, 8), (0, 30, 0)) + (0, 34 * number, 0)).reshape(-1, 3)
+        places = rows[(rows[:, 1] >= 0) & (rows[:, 1] < 180)] + rng.normal(0, 0.1, (1, 3))
+        frames.append(MovingDroplets(places, np.tile(0.01 * np.eye(3), (len(places), 1, 1)), np.zeros(len(places))))
+    results = write_series(tmp_path / "droplets", replace(shown, frames=frames), rate_hz=RATE_HZ)
+    result = told(capsys, "tracks", results, "-o", tmp_path / "tracks.h5")
+    assert result["tracks"] > 10
+    assert "whether droplets fly 0.5 mm more or less" in "".join(one["what"] for one in result["not_checked"])
 
 
 def test_tracks_of_a_series_lie_in_a_file_in_physical_units(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
