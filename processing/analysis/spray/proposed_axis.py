@@ -28,6 +28,9 @@ MOST_BEHIND = 0.05
 """Of the droplets, behind a nozzle."""
 MOST_UNSURE = 0.5
 """Width of the interval of the nozzle along the axis, over its distance from the middle of the droplets."""
+LEAST_APART = 3.0
+"""Mean square of the angles by which directions differ, in the plane where they differ least, over that of their
+scatter: of less the nozzle is found millimetres off, beside an interval that does not know it (measured: below 2.3)."""
 MOST_SWIRL = 0.1
 """Of the mean radial direction, around the axis: more draws the nozzle farther than its interval says."""
 SLICES, WIDER, MOST_CUT = 8, 1.2, 0.02
@@ -78,6 +81,10 @@ SWIRLS = (
 )
 AMID = "lines along the velocities meet amid the droplets: that is no nozzle; state nozzle and axis"
 CUT = "the box cuts the spray at its sides all along, so its axis is not known: state nozzle and axis, or widen the box"
+SCATTERED = (
+    "velocities scatter nearly as much as directions of the spray differ, so lines along them do not say where they "
+    "meet: state the nozzle"
+)
 PARALLEL = "droplets fly too much alike to say where they come from: state the nozzle"
 
 
@@ -118,7 +125,16 @@ def _no_nozzle(main: SprayAxis, flying: SpraySample, widths_mm: FloatArray) -> s
         return SWIRLS
     if np.linalg.norm(widths_mm * main.frame[0]) > MOST_UNSURE * abs(along_mm.mean()):
         return PARALLEL
-    return AMID if np.mean(along_mm < 0) > MOST_BEHIND else None
+    if np.mean(along_mm < 0) > MOST_BEHIND:
+        return AMID
+    return SCATTERED if _scattered(flying) else None
+
+
+def _scattered(flying: SpraySample) -> bool:
+    """Whether what scatter does to lines is about as much as what tells where they meet."""
+    ways = _ways(flying)
+    (least,) = np.linalg.eigvalsh(_matrices(_addends(ways, flying.points_mm).mean(axis=0)[None]))[:, 0]
+    return bool(least < LEAST_APART * _scatter2(ways, flying.points_mm))
 
 
 def _lopsided(axis: SprayAxis, whole: SpraySample, within_deg: float) -> bool:
@@ -184,13 +200,19 @@ def _addends(ways: FloatArray, points_mm: FloatArray) -> FloatArray:
 
 def _nearest(sums: FloatArray, scatter2: float) -> FloatArray:
     """Points that are nearest to all lines, (rows, 3), of sums (rows, 13); of no droplets not a number."""
-    matrix = np.empty((len(sums), 3, 3))
-    for number, (one, other) in enumerate(PAIRS):
-        matrix[:, one, other] = matrix[:, other, one] = sums[:, number]
     count = sums[:, 12, None, None]
     right = sums[:, 6:9] - scatter2 * sums[:, 9:12]
-    points = np.einsum("rij,rj->ri", np.linalg.pinv(matrix - scatter2 * count * np.eye(3), hermitian=True), right)
+    matrices = _matrices(sums) - scatter2 * count * np.eye(3)
+    points = np.einsum("rij,rj->ri", np.linalg.pinv(matrices, hermitian=True), right)
     return np.where(count[:, :, 0] > 0, points, np.nan)
+
+
+def _matrices(sums: FloatArray) -> FloatArray:
+    """Of sums (rows, 13): how much lines tell of a place along every direction, (rows, 3, 3)."""
+    matrices = np.empty((len(sums), 3, 3))
+    for number, (one, other) in enumerate(PAIRS):
+        matrices[:, one, other] = matrices[:, other, one] = sums[:, number]
+    return matrices
 
 
 def _scatter2(ways: FloatArray, points_mm: FloatArray) -> float:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from processing.analysis.spray.proposed_axis import NO_VELOCITIES, NOT_ALIKE, PARALLEL, proposed_axis
+from processing.analysis.spray.proposed_axis import NO_VELOCITIES, NOT_ALIKE, PARALLEL, SCATTERED, proposed_axis
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
 
@@ -59,6 +59,15 @@ def test_scatter_does_not_draw_the_nozzle_towards_the_droplets() -> None:
     along_mm = [one[1].value - NOZZLE_MM[1] for one in found if one is not None]
     assert len(along_mm) == 10
     assert abs(np.mean(along_mm)) < 0.5  # without the correction 1.5 mm
+
+
+@pytest.mark.parametrize(("half_deg", "scatter"), [(12.0, 0.12), (22.0, 0.2)])
+def test_velocities_that_scatter_as_much_as_directions_differ_tell_no_nozzle(half_deg: float, scatter: float) -> None:
+    """Before: beside the true one by millimetres, with an interval that did not hold it."""
+    for seed in range(5):
+        found = proposed_axis(cone(seed, half_deg, scatter))
+        assert found.nozzle_mm is None
+        assert found.reason == SCATTERED
 
 
 def test_a_proposal_is_said_as_one_with_the_options_that_state_it() -> None:
