@@ -27,7 +27,7 @@ FEWEST, MOST = 4, 60
 FEWEST_DROPLETS = 5
 """Of a group."""
 CHANCE, DRAWS = 0.001, 10_000
-"""How often chance makes as much of one of some ten figures, twice: two of a hundred sprays are called so."""
+"""How often chance makes as much of one of some twelve figures, twice: two of a hundred sprays are called so."""
 LEAST_RATIO, LEAST_RATIO_NUMBER = 1.05, 1.1
 """Of what matters, whatever chance does: of D32, speed and angles; of the number of droplets."""
 LEAST_TURN_DEG = 1.5
@@ -67,7 +67,7 @@ def changes_of_spray(sample: SpraySample, axis: SprayAxis | None = None) -> tupl
     if shots < FEWEST:
         return ()
     groups = np.arange(shots) // -(-shots // MOST)
-    series = [*_of_numbers(sample, groups), *_of_flight(sample, axis, groups), *_of_places(sample, groups)]
+    series = [*_of_numbers(sample, groups), *_of_flight(sample, axis, groups), *_of_places(sample, axis, groups)]
     told = [said for one in series if (said := _in_order(one, groups) or _in_turns(one))]
     return (f"the spray changes over its shots: {'; '.join(told)}: {REMEDY}",) if told else ()
 
@@ -109,8 +109,12 @@ def _across(text: str, values: FloatArray, axis: SprayAxis, least: float) -> Ite
         yield _Series(text.format(direction_name(direction)), column, least=least)
 
 
-def _of_places(sample: SpraySample, groups: NDArray[np.intp]) -> Iterator[_Series]:
-    """Where droplets lie in the mean."""
+def _of_places(sample: SpraySample, axis: SprayAxis | None, groups: NDArray[np.intp]) -> Iterator[_Series]:
+    """Where droplets lie in the mean, and how far from the axis the nozzle sees them."""
+    if axis:
+        along_mm, from_mm, _ = axis.coordinates(sample.points_mm)
+        (seen_deg,) = _means(np.degrees(np.arctan2(from_mm, along_mm))[:, None], sample, groups).T
+        yield _Series("seen from the nozzle droplets lie {} degrees from the axis", seen_deg, LEAST_RATIO)
     least_mm = LEAST_SHIFT * sample.points_mm.std(axis=0) if len(sample) else np.zeros(3)
     for name, places_mm, least in zip("xyz", _means(sample.points_mm, sample, groups).T, least_mm, strict=True):
         yield _Series(f"in the mean droplets lie at {name} = {{}} mm", places_mm, least=float(least))

@@ -1,6 +1,7 @@
 """A spray that changes over its shots is told, with what changes; one whose shots only scatter is not."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -71,6 +72,16 @@ def test_two_sprays_one_after_the_other_are_told_with_both_angles_and_where_they
 )
 def test_whatever_changes_is_told(one: SpraySample, what: str) -> None:
     assert what in told(one)
+
+
+@pytest.mark.parametrize("nozzle_moves", [True, False], ids=["nozzle nears", "cone widens"])
+def test_a_cone_that_changes_is_told_without_velocities_too(nozzle_moves: bool) -> None:
+    """Of single exposures, and of a nozzle that moves along the axis, places alone tell."""
+    one = sample(half_deg=lambda shot: 25.0 if shot > 4 and not nozzle_moves else 20.0)
+    later = (one.shot > 4) & nozzle_moves
+    points_mm = one.points_mm + np.array([0, 2.0, 0]) * later[:, None]
+    still = replace(one, points_mm=points_mm, velocities_m_s=np.full_like(points_mm, np.nan))
+    assert "seen from the nozzle droplets lie 20 degrees from the axis in the first 5 shots" in told(still)
 
 
 def test_two_sprays_in_turns_are_told_with_both_angles() -> None:
