@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.spray.cone_tilt import MOST_LEAN_DEG, lean_of
+from processing.analysis.spray.cone import MOST_LEAN_DEG, apex_mm, lean_of
 from processing.analysis.spray.proposed_axis import ProposedAxis
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
@@ -98,6 +98,7 @@ def _held_all_around(sample: SpraySample, axis: SprayAxis) -> NDArray[np.bool_]:
 def _of_meeting(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | None) -> Iterator[str]:
     """Whether droplets fly away from another place."""
     if proposed is None or proposed.nozzle_mm is None:
+        yield from _of_widening(sample, axis)
         return
     place_mm = np.array([one.value for one in proposed.nozzle_mm])
     unsure_mm = np.array([(one.high - one.low) / 2 for one in proposed.nozzle_mm])
@@ -109,6 +110,18 @@ def _of_meeting(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | N
             f"the lines along which droplets fly meet {np.linalg.norm(off_mm):.2g} mm from the stated nozzle, "
             f"{_numbers(axis.nozzle_mm)} mm, at {_numbers(place_mm)}: is its place stated rightly? Angles are seen "
             f"from there; {proposed.words}"
+        )
+
+
+def _of_widening(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:
+    """Whether a spray whose flights tell no nozzle widens from another place."""
+    apex = apex_mm(sample, axis)
+    if apex and abs(apex.off_mm) > MOST_NEARER * apex.far_mm + apex.within_mm:
+        where = "beyond" if apex.off_mm > 0 else "before"
+        yield (
+            f"seen from the side, the spray widens from {abs(apex.off_mm):.2g} mm {where} the stated nozzle, "
+            f"{_numbers(axis.nozzle_mm)} mm (99 %: within {apex.within_mm:.2g}): is its place stated rightly, or does "
+            "the spray bend? Angles are seen from there"
         )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from processing.analysis.estimates import Estimate, Figures
-from processing.analysis.spray.cone_tilt import lean_of
+from processing.analysis.spray.cone import lean_of
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray

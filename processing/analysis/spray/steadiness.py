@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.analysis.estimates import SEED
-from processing.analysis.spray.cone_tilt import tilt_addends, tilts_deg
+from processing.analysis.spray.cone import tilt_addends, tilts_deg
 from processing.analysis.spray.spray_axis import SprayAxis, direction_name
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray

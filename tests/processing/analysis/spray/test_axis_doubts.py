@@ -69,6 +69,17 @@ def test_without_velocities_places_tell_a_nozzle_beside_the_axis() -> None:
     assert "beside the axis, seen from the stated nozzle" in told(cone(nozzle_mm=(1.0, 0, 0), flies=False))
 
 
+@pytest.mark.parametrize(
+    ("off_mm", "swirl", "said"), [(2.5, 0.0, "beyond"), (-4.0, 0.0, "before"), (2.5, 0.4, "beyond")]
+)
+def test_where_flights_tell_no_nozzle_places_tell_one_along_the_axis(off_mm: float, swirl: float, said: str) -> None:
+    wide_mm = np.array([[-8.0, 8, -8], [8, 12, 8]])
+    told_of = told(cone(nozzle_mm=(0, off_mm, 0), swirl=swirl, flies=swirl > 0, box_mm=wide_mm))
+    assert f" mm {said} the stated nozzle, 0,0,0 mm" in told_of
+    assert abs(float(told_of.split("widens from ")[1].split()[0]) - abs(off_mm)) < 0.25 * abs(off_mm)
+    assert "does the spray bend?" in told_of
+
+
 def test_a_nozzle_on_the_other_side_of_the_spray_is_told() -> None:
     said = told(cone(), SprayAxis((0, 20, 0), (0, -1, 0)))
     assert "meet 20 mm from the stated nozzle" in said
