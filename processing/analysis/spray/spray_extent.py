@@ -3,9 +3,9 @@
 * *Cone angle*: twice the angle from the axis, seen from the nozzle, within which a share of the liquid of the box is:
   90 %, and 50 %, which in a hollow cone is where the cone is. Spatial: by what is there, not by what flows.
 * *Penetration*: the distance from the nozzle along the axis beyond which 1 % of the liquid of the box is. It is known
-  where the box holds the tip: where its last tenth has less than a tenth of the mean of the rest, and nine tenths of
-  the liquid before the tip would still be in the box a tenth farther from the nozzle. Of a spray that goes on beyond
-  the box, or leaves it by its sides, there is none.
+  where the box holds the tip: where its last tenth has less than a tenth of the mean of the rest, and a tenth farther
+  from the nozzle nine tenths of the liquid before the tip would still be in the box, and next to none of all liquid
+  beyond its sides. Of a spray that goes on beyond the box, or leaves it by its sides, there is none.
 """
 
 from typing import Annotated
@@ -25,6 +25,8 @@ LEAST_COVERED = 0.9
 """Of the ring around the cone's edge, which the box must hold."""
 EDGE = 0.1
 """Of the angle, to both sides: so wide is that ring; of the box's length: its last part."""
+MOST_LEAVING = 0.03
+"""Of the liquid, about to leave the box by its sides: of a cone that does so 6 % and more, at the skirts of others 2."""
 FEWEST = 20
 TOO_NARROW = (
     "the box does not reach around the cone: it cuts off what flies farther out, and flux and densities are means over "
@@ -109,5 +111,6 @@ def _goes_on(sample: SpraySample, axis: SprayAxis, box_mm: FloatArray, tip_mm: f
         return GOES_ON
     farther_mm = np.array(axis.nozzle_mm) + (1 + EDGE) * (sample.points_mm - np.array(axis.nozzle_mm))
     leaves = ((farther_mm < box_mm[0]) | (farther_mm > box_mm[1])).any(axis=1)
-    before = along_mm > (1 - EDGE) * tip_mm
-    return LEAVES if cubes[before & leaves].sum() > EDGE * cubes[before].sum() else None
+    before, by_its_sides = along_mm > (1 - EDGE) * tip_mm, leaves & ((1 + EDGE) * along_mm < far_mm)
+    leaving = cubes[before & leaves].sum() > EDGE * cubes[before].sum()
+    return LEAVES if leaving or cubes[by_its_sides].sum() > MOST_LEAVING * cubes.sum() else None

@@ -319,6 +319,22 @@ def test_a_spray_that_leaves_the_box_by_its_sides_has_no_penetration(half_deg: f
     assert "leaves the box by its sides" in (extent.penetration_reason or "")
 
 
+def test_a_core_that_ends_in_the_box_tells_no_penetration_of_a_cone_that_leaves_it_before() -> None:
+    """Most of the liquid flies 60 degrees from the axis, farther than the box tells; a thin core ends at 9 mm."""
+    rng, box, shots = np.random.default_rng(0), VoxelGrid((100, 120, 100), (-4.95, 2.05, -4.95), 0.1), []
+    for shot in range(4):
+        way_mm = np.concatenate([rng.uniform(2, 30, 1500), rng.uniform(2, 9, 100)])
+        angle = np.radians(np.where(np.arange(1600) < 1500, 60.0, 6.0) + rng.normal(0, 2, 1600))
+        azimuth = rng.uniform(0, 2 * np.pi, 1600)
+        ways = np.column_stack([np.sin(angle) * np.cos(azimuth), np.cos(angle), np.sin(angle) * np.sin(azimuth)])
+        points_mm = way_mm[:, None] * ways
+        seen = points_mm[(np.abs(points_mm - [0, 8, 0]) < [5, 6, 5]).all(axis=1)]
+        shots.append(stored_shot(rng.uniform(30, 50, len(seen)), seen, shot=shot, grid=box))
+    extent = spray_statistics(shots, ASKED).extent
+    assert extent
+    assert "leaves the box by its sides" in (extent.penetration_reason or "")
+
+
 def test_droplets_without_partner_take_the_mean_velocity_of_the_others(cone: list[StoredDroplets]) -> None:
     """Lost at random, a third of the velocities changes the flux by chance only."""
     rng = np.random.default_rng(2)
