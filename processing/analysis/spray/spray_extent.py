@@ -26,7 +26,7 @@ LEAST_COVERED = 0.9
 EDGE = 0.1
 """Of the angle, to both sides: so wide is that ring; of the box's length: its last part."""
 MOST_LEAVING = 0.03
-"""Of the liquid, about to leave the box by its sides: of a cone that does so 6 % and more, at the skirts of others 2."""
+"""Of the liquid, about to leave the box by its sides: 6 % and more of a cone that does so, 2 at skirts of others."""
 FEWEST = 20
 TOO_NARROW = (
     "the box does not reach around the cone: it cuts off what flies farther out, and flux and densities are means over "
