@@ -37,6 +37,9 @@ SLICES, WIDER, MOST_CUT = 8, 1.2, 0.02
 """Across the axis, of equal numbers of droplets; those that would be outside the box if they were a fifth farther from
 the axis are at its sides, and a slice that has more of them is cut."""
 SECTORS, ROUNDS = 8, 3
+WILD, TRIMMED = 9.0, 6
+"""Times the mean square of the scatter: 1 of 8000 normal flights is beyond; and how often those beyond are left out.
+Two of a hundred that fly anywhere, as with wrong partners, drew the nozzle by a millimetre."""
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
@@ -98,7 +101,10 @@ def proposed_axis(sample: SpraySample) -> ProposedAxis:
     """
     paired = sample.chosen(sample.paired)
     speeds_m_s = np.linalg.norm(paired.velocities_m_s, axis=1, keepdims=True)
-    flying = paired.chosen(speeds_m_s[:, 0] > 0)
+    moving = paired.chosen(speeds_m_s[:, 0] > 0)
+    if len(moving) < FEWEST:
+        return ProposedAxis(reason=NO_VELOCITIES)
+    flying = moving.chosen(_together(moving))
     if len(flying) < FEWEST:
         return ProposedAxis(reason=NO_VELOCITIES)
     nozzle = _nozzle(flying)
@@ -219,10 +225,26 @@ def _scatter2(ways: FloatArray, points_mm: FloatArray) -> float:
     """Mean square of the angle by which droplets fly beside the line from the nozzle."""
     sums, scatter2 = _addends(ways, points_mm).sum(axis=0)[None], 0.0
     for _ in range(ROUNDS):
-        from_mm = points_mm - _nearest(sums, scatter2)[0]
-        missed_mm = from_mm - np.sum(from_mm * ways, axis=1, keepdims=True) * ways
-        scatter2 = float(np.median(np.sum(missed_mm**2, axis=1) / np.sum(from_mm**2, axis=1)) / MEDIAN_OF_TWO)
+        missed2 = _missed2(ways, points_mm - _nearest(sums, scatter2)[0])
+        scatter2 = float(np.median(missed2) / MEDIAN_OF_TWO)
     return scatter2
+
+
+def _missed2(ways: FloatArray, from_mm: FloatArray) -> FloatArray:
+    """Squares of the sines by which droplets fly beside the line from a place, (N,)."""
+    missed_mm = from_mm - np.sum(from_mm * ways, axis=1, keepdims=True) * ways
+    return np.asarray(np.sum(missed_mm**2, axis=1) / np.sum(from_mm**2, axis=1))
+
+
+def _together(moving: SpraySample) -> NDArray[np.bool_]:
+    """Droplets that fly along lines from one place, but for scatter: not mist, nor those with a wrong partner."""
+    ways, addends = _ways(moving), _addends(_ways(moving), moving.points_mm)
+    kept = np.ones(len(moving), np.bool_)
+    for _ in range(TRIMMED):
+        scatter2 = _scatter2(ways[kept], moving.points_mm[kept])
+        (place_mm,) = _nearest(addends[kept].sum(axis=0)[None], scatter2)
+        kept = _missed2(ways, moving.points_mm - place_mm) <= WILD * scatter2
+    return kept
 
 
 MEDIAN_OF_TWO = float(np.log(2))
