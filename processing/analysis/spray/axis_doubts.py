@@ -5,7 +5,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.spray.cone import MOST_LEAN_DEG, apex_mm, lean_of
+from processing.analysis.estimates import Figures
+from processing.analysis.spray.cone import MOST_LEAN_DEG, SURE, apex_mm, lean_of
 from processing.analysis.spray.proposed_axis import ProposedAxis
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
@@ -27,9 +28,9 @@ MOST_NEARER = 0.1
 """Of the distance from the nozzle to the droplets: so much nearer or farther it may be; angles change as much."""
 SURER = 1.5
 """Times the interval of a proposal, which has 95 %: 99 and more."""
-MOST_LONGER, TWO_HEAPED = 2.0, 1.6
-"""Of where droplets come from: length over width, and the kurtosis of its length: two places have 1, three 1.5, a slit
-1.8, and one place with scatter 3."""
+MOST_LONGER, TWO_HEAPED, WILD = 2.0, 1.7, 3.5
+"""Of where droplets come from: length over width, and the kurtosis of its length, less scatter, and its whole interval:
+two places have 1, three 1.5, a slit 1.8, one place 3. Beyond 3.5 medians are wrong partners."""
 RING = 16
 """Places around the axis that must all be in the box."""
 
@@ -131,13 +132,36 @@ def _of_two_places(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:
     if len(flying) < FEWEST:
         return
     crossed_mm = axis.crossings_mm(flying.points_mm, flying.velocities_m_s)
-    (across_mm2, along_mm2), directions = np.linalg.eigh(np.cov(crossed_mm.T))
-    row_mm = (crossed_mm - crossed_mm.mean(axis=0)) @ directions[:, 1]
-    if along_mm2 > MOST_LONGER**2 * across_mm2 and np.mean(row_mm**4) < TWO_HEAPED * along_mm2**2:
+    off_mm = np.linalg.norm(crossed_mm - np.median(crossed_mm, axis=0), axis=1)
+    near = off_mm <= WILD * np.median(off_mm)
+    if apart_mm := _two_heaps_mm(flying.chosen(near), crossed_mm[near]):
         yield (
-            f"droplets come from places {2 * np.sqrt(along_mm2):.2g} mm apart, on both sides of the stated nozzle: are "
+            f"droplets come from places {apart_mm:.2g} mm apart, on both sides of the stated nozzle: are "
             "they of two sprays? Angles and shares are of none of them; measure a box around each"
         )
+
+
+def _two_heaps_mm(flying: SpraySample, crossed_mm: FloatArray) -> float | None:
+    """How far apart two heaps in a row are; None where there are none. Across the row there is scatter alone."""
+    (across_mm2, along_mm2), directions = np.linalg.eigh(np.cov(crossed_mm.T))
+    own_mm2 = along_mm2 - across_mm2
+    if along_mm2 <= MOST_LONGER**2 * across_mm2:
+        return None
+    row_mm = (crossed_mm - crossed_mm.mean(axis=0)) @ directions[:, 1]
+    columns = np.column_stack([row_mm**4, row_mm**2, np.ones(len(row_mm))])
+
+    def kurtosis_of(drawn: SpraySample) -> Figures:
+        sums = drawn.totals(columns)
+        return lambda counts: _kurtosis(sums(counts), own_mm2)
+
+    (told,) = flying.estimated(kurtosis_of, signed=True, confidence=SURE)
+    return 2 * float(np.sqrt(own_mm2)) if told and told.high < TWO_HEAPED else None
+
+
+def _kurtosis(sums: FloatArray, own_mm2: float) -> FloatArray:
+    """Of places, (rows, 1), of sums of x^4, x^2, 1; normal scatter adds to both, and to neither of this difference."""
+    fourth, second = (sums[:, :2] / np.maximum(sums[:, 2:], 1)).T
+    return np.asarray(3 + (fourth - 3 * second**2) / own_mm2**2)[:, None]
 
 
 def _numbers(values: Iterable[float]) -> str:
