@@ -48,7 +48,11 @@ def spaced_panels(figure: Figure, rows: int, columns: int, room: Room) -> NDArra
     return panels
 
 
+LEAST = 1e-9
+
+
 def rounded_down(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten below a value: for the key of a scale."""
-    power = 10.0 ** np.floor(np.log10(max(value, 1e-9)))
+    """The largest of 1, 2, 5 times a power of ten below a value: for the key of a scale, also where nothing moves."""
+    value = max(value, LEAST)
+    power = 10.0 ** np.floor(np.log10(value))
     return float(max(step for step in (power, 2 * power, 5 * power) if step <= value * (1 + 1e-9)))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from processing.figures.spacing import Room, spaced_panels
+from processing.figures.spacing import Room, rounded_down, spaced_panels
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 4), (3, 2)])
@@ -21,3 +21,9 @@ def test_panels_leave_the_stated_room(rows: int, columns: int) -> None:
     np.testing.assert_allclose(bottom[:-1] - top[1:], 0.7)
     np.testing.assert_allclose(right - left, right[0, 0] - left[0, 0])
     np.testing.assert_allclose(top - bottom, top[0, 0] - bottom[0, 0])
+
+
+@pytest.mark.parametrize(("value", "key"), [(0.0, 1e-9), (0.7, 0.5), (1.0, 1.0), (4.9, 2.0), (50.0, 50.0)])
+def test_a_scale_has_a_key_where_nothing_moves_too(value: float, key: float) -> None:
+    """A report of droplets at rest ended in a traceback."""
+    assert rounded_down(value) == pytest.approx(key)
