@@ -54,7 +54,7 @@ def fainter(shares: Shares, settings: ReconstructionSettings) -> float:
 
     Without a sliding minimum, light that is missing is part of all intensities: what is black is as intense as ever.
     """
-    left = [_left(share) for share in shares.values() if settings.minimum_window_px or share > 1]
+    left = [_left(share) if settings.minimum_window_px or share > 1 else 1.0 for share in shares.values()]
     if settings.method is ReconstructionMethod.MINLOS:
         return 1 - min(left, default=1.0)
     return 1 - math.prod(left) ** (1 if settings.method is ReconstructionMethod.MLOS else 1 / max(len(left), 1))

@@ -238,6 +238,12 @@ def test_light_in_excess_of_the_background_is_told(window_px: int, calibration_f
     assert "106 %" in told
 
 
+@pytest.mark.parametrize("window_px", [0, 201])
+def test_a_view_in_excess_light_is_one_of_all_views_whatever_the_window(window_px: int) -> None:
+    settings = SETTINGS.model_copy(update={"method": ReconstructionMethod.GAVLOS, "minimum_window_px": window_px})
+    assert fainter({"view1": 1.2, "view2": 1.0, "view3": 1.0, "view4": 1.0}, settings) == pytest.approx(1 - 0.8**0.25)
+
+
 def test_twelve_bits_in_words_of_sixteen_are_told(calibration_file: Path, tmp_path: Path) -> None:
     run_dir = write_run(tmp_path / "run", bits=16)
     assert {volume.dim_views for volume in reconstructed(run_dir, calibration_file).volumes} == {tuple(cameras())}
