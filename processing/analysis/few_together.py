@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from processing.analysis.droplets.droplet_file import DIAMETER, StoredDroplets
+from processing.analysis.droplets.droplet_statistics import REFUSED
 from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS
 from processing.analysis.droplets.shadows.masked_liquid import UNEXPLAINED
 from processing.analysis.droplets.shadows.shadow_light import MANY_UNLIKE
@@ -32,13 +33,13 @@ def few_together(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
 
 
 def _views(shots: Sequence[StoredDroplets]) -> list[Elongation]:
-    """How long shadows are, by view, of all exposures together; files of older programs do not tell."""
+    """How long shadows are, by view, of all exposures that are not refused; files of older programs do not tell."""
     told = defaultdict(list)
-    for shot in shots:
-        for exposure in json.loads(str(shot.provenance.get("exposures", "{}"))).values():
-            for name, view in exposure.get("views", {}).items():
-                if longer := view.get("elongation"):
-                    told[name].append(Elongation(**longer))
+    exposures = (one for shot in shots for one in json.loads(str(shot.provenance.get("exposures", "{}"))).values())
+    for exposure in (one for one in exposures if one.get("verdict") != REFUSED):
+        for name, view in exposure.get("views", {}).items():
+            if longer := view.get("elongation"):
+                told[name].append(Elongation(**longer))
     return [Elongation.together(several) for several in told.values()]
 
 

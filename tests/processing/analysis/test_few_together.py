@@ -59,6 +59,15 @@ def test_few_shadows_of_all_shots_tell_that_they_are_longer_than_wide(along_px2:
     assert bool(what) is bool(told)
 
 
+def test_shadows_of_refused_exposures_say_nothing_of_the_others() -> None:
+    several = shots(6)
+    for shot in several:
+        view = {"elongation": asdict(Elongation(0.4, 0.0, 0.07, 3.0, 0.64, 4))}
+        exposure = {"verdict": "refused", "views": {f"view{number}": view for number in range(1, 5)}}
+        shot.provenance["exposures"] = json.dumps({"a": exposure})
+    assert few_together(several) == ()
+
+
 def test_figures_of_a_spray_are_doubted() -> None:
     assert "smaller in exposure B" in "".join(spray_doubts(shots(ratio=0.95), None, None))
 
