@@ -17,7 +17,7 @@ from processing.analysis.droplets.shadows.light.seen_light import SeenLight
 from processing.analysis.droplets.shadows.shadow_finder import find_shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from processing.analysis.droplets.shadows.shadow_rounds import ShadowRounds
-from processing.analysis.droplets.shadows.shadow_shot import looking
+from processing.analysis.droplets.shadows.shadow_shot import looking, unmeasurable
 from processing.preprocessing import Intensity
 from processing.runs.measured_images import shadow_images, without_ignored
 from processing.runs.results_file import FrameName
@@ -59,8 +59,10 @@ class RunLight:
     def _exposures(self, shots: Sequence[int], threads: int) -> Iterator[Transmissions]:
         for index in shots:
             with suppress(ShotFileError):  # whoever asks for that one is told
-                if (shot := self._run.read_shot(index)).valid:
-                    images, trust = known_shadows(self._run, shot, "a", self._references, self._ignored)
+                if not (shot := self._run.read_shot(index)).valid:
+                    continue
+                images, trust = known_shadows(self._run, shot, "a", self._references, self._ignored)
+                if not unmeasurable(images, trust, self._search):
                     yield looking(images, trust, self._search, threads)
 
 

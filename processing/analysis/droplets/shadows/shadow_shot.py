@@ -91,7 +91,7 @@ def measure_shadows(
     check_images(images, search)
     trusts = [np.ones(np.shape(image), np.float32) for image in images] if trust is None else trust
     check_images(trusts, search)
-    if reasons := _unmeasurable(images, trusts, search):
+    if reasons := unmeasurable(images, trusts, search):
         return _refused(*reasons)
     shot = looking(images, trusts, search, threads)
     known_shadows = [(1 - image) * np.sqrt(one) for image, one in zip(shot.images, shot.trust, strict=True)]
@@ -114,7 +114,7 @@ def _refused(*reasons: str) -> ShadowExposure:
     return MeasuredExposure(SizedDroplets.none(), {}, None, ShotVerdict.REFUSED, reasons)
 
 
-def _unmeasurable(images: Sequence[Image], trusts: Sequence[Image], search: DropletSearch) -> tuple[str, ...]:
+def unmeasurable(images: Sequence[Image], trusts: Sequence[Image], search: DropletSearch) -> tuple[str, ...]:
     """Why views can show no shadows of the grid, whether there are droplets or not; empty where all can."""
     if reasons := unlit(images, trusts, search.names):
         return reasons

@@ -1,6 +1,7 @@
 """Shots with few droplets vote together on the light of their run."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -83,3 +84,11 @@ def test_a_shot_in_another_light_than_the_first_ones_is_doubted(tmp_path: Path) 
     assert 0 < other.summary.droplets < 10
     assert (alike.summary.verdict, other.summary.verdict) == (ShotVerdict.GOOD, ShotVerdict.DOUBTFUL)
     assert "first shots" in other.summary.reasons[-1]
+
+
+def test_a_shot_that_can_show_no_shadows_has_no_vote(tmp_path: Path) -> None:
+    """It has more than twice the light of its background."""
+    scenes = [few(seed, sharp=False) for seed in (1, 2, 3)]
+    bright = replace(scenes[0], images=[2.5 * image for image in scenes[0].images])
+    shots = measured(tmp_path, [bright, *scenes[1:]], (0, 1))
+    assert [shot.summary.verdict for shot in shots] == [ShotVerdict.REFUSED, ShotVerdict.GOOD]
