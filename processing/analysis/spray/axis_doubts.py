@@ -7,13 +7,11 @@ from numpy.typing import NDArray
 
 from processing.analysis.estimates import Figures
 from processing.analysis.spray.cone import MOST_LEAN_DEG, SURE, apex_mm, lean_of
-from processing.analysis.spray.proposed_axis import ProposedAxis
+from processing.analysis.spray.proposed_axis import MOST_BEHIND, SURER, ProposedAxis
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
 
-MOST_BEHIND = 0.05
-"""Of the droplets; some are carried back."""
 FARTHEST_MM = 2000.0
 """From the nozzle: no spray that is measured droplet by droplet is as long."""
 MOST_OFF_WAY_DEG = 15.0
@@ -26,8 +24,6 @@ FEWEST = 100
 """Droplets with a velocity, to say that they come from two places."""
 MOST_NEARER = 0.1
 """Of the distance from the nozzle to the droplets: so much nearer or farther it may be; angles change as much."""
-SURER = 1.5
-"""Times the interval of a proposal, which has 95 %: 99 and more."""
 MOST_LONGER, TWO_HEAPED, WILD = 2.0, 1.7, 3.5
 """Of where droplets come from: length over width, and the kurtosis of its length, less scatter, and its whole interval:
 two places have 1, three 1.5, a slit 1.8, one place 3. Beyond 3.5 medians are wrong partners."""
@@ -57,7 +53,7 @@ def axis_doubts(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | N
 def _of_lean(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | None) -> Iterator[str]:
     """Whether the middle of the spray is beside the axis: of its flight, or of where it is as the nozzle sees it."""
     held = sample.chosen(_held_all_around(sample, axis))
-    flying = held.chosen(held.paired & (np.abs(held.velocities_m_s) > 0).any(axis=1))
+    flying = held.flying
     said = f": {proposed.words}" if proposed else ""
     remedy = f"State both with --nozzle and --axis, or in the run's notes{said}"
     if lean := lean_of(flying, flying.velocities_m_s, axis) or _from_proposed(axis, proposed):
@@ -128,7 +124,7 @@ def _of_widening(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:
 
 def _of_two_places(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:
     """Whether droplets come from two nozzles or more in a row, and next to none from between them."""
-    flying = sample.chosen(sample.paired & (np.abs(sample.velocities_m_s) > 0).any(axis=1))
+    flying = sample.flying
     if len(flying) < FEWEST:
         return
     crossed_mm = axis.crossings_mm(flying.points_mm, flying.velocities_m_s)

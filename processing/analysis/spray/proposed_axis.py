@@ -20,12 +20,13 @@ from processing.reconstruction.settings import FrozenValue
 
 FEWEST = 100
 """Droplets with a velocity."""
-MOST_UNLIKE, SURER = 0.2, 1.5
+MOST_UNLIKE = 0.2
 """Half the sum of the differences between opposite sectors, over all droplets: gusts have less, and chance of few makes
-the root of their number more; and times the interval of the mean direction, from which the middle of the cone may be.
-"""
+the root of their number more."""
+SURER = 1.5
+"""Times an interval, which has 95 %: 99 and more."""
 MOST_BEHIND = 0.05
-"""Of the droplets, behind a nozzle."""
+"""Of the droplets, behind a nozzle; some are carried back."""
 MOST_UNSURE = 0.5
 """Width of the interval of the nozzle along the axis, over its distance from the middle of the droplets."""
 LEAST_APART = 3.0
@@ -99,9 +100,7 @@ def proposed_axis(sample: SpraySample) -> ProposedAxis:
     sample : SpraySample
         Its droplets; those with a velocity have a say.
     """
-    paired = sample.chosen(sample.paired)
-    speeds_m_s = np.linalg.norm(paired.velocities_m_s, axis=1, keepdims=True)
-    moving = paired.chosen(speeds_m_s[:, 0] > 0)
+    moving = sample.flying
     if len(moving) < FEWEST:
         return ProposedAxis(reason=NO_VELOCITIES)
     flying = moving.chosen(_together(moving))

@@ -70,6 +70,11 @@ class SpraySample:
         return np.asarray(np.isfinite(self.velocities_m_s).all(axis=1), np.bool_)
 
     @property
+    def flying(self) -> "SpraySample":
+        """Its droplets that have a velocity, and do not stand still: only these say where they come from."""
+        return self.chosen(self.paired & (self.velocities_m_s != 0).any(axis=1))
+
+    @property
     def cubes_um3(self) -> FloatArray:
         """Diameters to the third: volumes, but for pi / 6; (N,)."""
         return self.diameters_um**3

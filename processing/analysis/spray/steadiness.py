@@ -85,7 +85,7 @@ def _of_numbers(sample: SpraySample, groups: NDArray[np.intp]) -> Iterator[_Seri
 
 def _of_flight(sample: SpraySample, axis: SprayAxis | None, groups: NDArray[np.intp]) -> Iterator[_Series]:
     """Speed, direction, how far from it droplets fly, and where they come from."""
-    flying = sample.chosen(sample.paired & (np.abs(sample.velocities_m_s) > 0).any(axis=1))
+    flying = sample.flying
     if not len(flying):
         return
     speeds_m_s = np.linalg.norm(flying.velocities_m_s, axis=1)
