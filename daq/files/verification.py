@@ -170,12 +170,8 @@ def _without_shots(
     recorded = read_shot_count(run_dir)
     planned = header.plan.total_shots if header.plan else None
     plan = "" if planned is None else f" of {planned} that were planned"
-    were = (
-        f"{counted(recorded, 'shot')}{plan} recorded"
-        if recorded
-        else f"nobody knows how many shots{plan} were recorded"
-    )
-    text = f"{run_dir}: has no folder {SHOTS_FOLDER}; {were}: bring it back, or copy it from a backup"
+    lay = f"{counted(recorded, 'shot')}{plan} lay" if recorded else f"nobody knows how many shots{plan} lay"
+    text = f"{run_dir}: has no folder {SHOTS_FOLDER}; {lay} in it: bring it back, or copy it from a backup"
     outcome = closing.outcome if closing else None
     return Verification(outcome, recorded, 0, 0, (Flaw(FlawKind.MISSING, SHOTS_FOLDER, text), *strangers))
 

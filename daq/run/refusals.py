@@ -64,7 +64,7 @@ REMEDIES: Mapping[RefusalCode, str] = MappingProxyType(
         RefusalCode.NETWORK: "lower the rate, or give the cameras more network",
         RefusalCode.STAGE: "choose positions that the stage reaches",
         RefusalCode.REFERENCES: "choose other dark and background runs, or record them again",
-        RefusalCode.REFERENCE_CAMERA: ("put the camera back, or record dark and background again, and calibrate again"),
+        RefusalCode.REFERENCE_CAMERA: "put the camera back, or record dark and background again, and calibrate again",
         RefusalCode.CALIBRATION_UNKNOWN: "choose a calibration that exists",
         RefusalCode.CALIBRATION_DAMAGED: "choose another calibration, or copy this one back from a backup",
         RefusalCode.CALIBRATION_SIZE: "choose another calibration, or calibrate again",
