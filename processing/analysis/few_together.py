@@ -14,8 +14,7 @@ import numpy as np
 from processing.analysis.droplets.droplet_file import DIAMETER, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import REFUSED
 from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS
-from processing.analysis.droplets.shadows.masked_liquid import UNEXPLAINED
-from processing.analysis.droplets.shadows.shadow_light import MANY_UNLIKE
+from processing.analysis.droplets.shadows.shadow_light import unlike_discs
 from processing.analysis.droplets.verdicts.elongation import WRONG, Elongation, elongation_told
 from processing.analysis.unlike_sizes import FEWEST, LEAST_P_PAIR, LONGEST_NS, common_share, unlike_told
 from processing.geometry import FloatArray
@@ -50,15 +49,7 @@ def _shapes(shots: Sequence[StoredDroplets]) -> str:
         for frame in "ab"
     ]
     few = [one for one in exposures if len(one) < LEAST_DROPLETS]
-    left = np.concatenate([np.empty(0), *few])
-    unlike = int(np.count_nonzero(left > UNEXPLAINED))
-    if len(left) < LEAST_DROPLETS or unlike <= MANY_UNLIKE * len(left):
-        return ""
-    return (
-        f"{100 * unlike / len(left):.0f} % of {len(left)} droplets, limit {100 * MANY_UNLIKE:.0f} %, do not look like "
-        "round opaque discs: do they move while the light is on, is it on twice within an exposure, or are images "
-        "processed? Number and diameters are wrong then"
-    )
+    return unlike_discs(np.concatenate([np.empty(0), *few]))
 
 
 def _sizes(shots: Sequence[StoredDroplets]) -> str:

@@ -74,12 +74,11 @@ def seen_shadows(
             _masked_shares(fit, into_grid),
         ]
     )
-    light = (fit.optics.condenser_ratio, 2000 * fit.light.radius_sd * search.searched.pitch_mm)
-    seen = {name: SeenShadows(*row) for name, row in zip(search.names, rows.tolist(), strict=True)}
-    longer = zip(seen.items(), _elongations(shot, fit), strict=True)
-    ratio, sd_um = light
+    ratio, sd_um = fit.optics.condenser_ratio, 2000 * fit.light.radius_sd * search.searched.pitch_mm
+    views = zip(search.names, rows.tolist(), _elongations(shot, fit), strict=True)
     return {
-        name: replace(view, condenser_ratio=ratio, light_sd_um=sd_um, elongation=one) for (name, view), one in longer
+        name: replace(SeenShadows(*row), condenser_ratio=ratio, light_sd_um=sd_um, elongation=longer)
+        for name, row, longer in views
     }
 
 

@@ -16,6 +16,7 @@ from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS
 from processing.analysis.droplets.shadows.masked_liquid import UNEXPLAINED
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise
 from processing.analysis.droplets.verdicts.explained_images import RatioLimits, judged
+from processing.geometry import FloatArray
 
 LIMITS = RatioLimits(trusted=1.25, refused=2.0)
 """Of discs: overlapping shadows leave something even where all droplets are right. Simulated shots of 28 to 40 droplets
@@ -132,13 +133,19 @@ def _fringe_doubts(seen: DiscImages, shadows: Shadows) -> tuple[str, ...]:
 
 def judged_by_shape(shot: MeasuredExposure[SizedDroplets, Seen]) -> MeasuredExposure[SizedDroplets, Seen]:
     """A shot, doubtful where many droplets do not look as round opaque discs do, however small they are."""
-    unlike = int(np.count_nonzero(shot.droplets.residual > UNEXPLAINED))
-    if len(shot.droplets) < LEAST_DROPLETS or unlike <= MANY_UNLIKE * len(shot.droplets):
+    if not (reason := unlike_discs(shot.droplets.residual)):
         return shot
-    share = f"{100 * unlike / len(shot.droplets):.0f} % of the droplets, limit {100 * MANY_UNLIKE:.0f} %"
-    reason = (
+    verdict = ShotVerdict.DOUBTFUL if shot.verdict is ShotVerdict.GOOD else shot.verdict
+    return replace(shot, verdict=verdict, reasons=(*shot.reasons, reason))
+
+
+def unlike_discs(residual: FloatArray) -> str:
+    """Why shapes are doubted, by what is left around each of N droplets; empty where few are unlike, or N is small."""
+    unlike = int(np.count_nonzero(residual > UNEXPLAINED))
+    if len(residual) < LEAST_DROPLETS or unlike <= MANY_UNLIKE * len(residual):
+        return ""
+    share = f"{100 * unlike / len(residual):.0f} % of {len(residual)} droplets, limit {100 * MANY_UNLIKE:.0f} %"
+    return (
         f"{share}, do not look like round opaque discs: do they move by more than their blur while the light is on, is "
         "the light on twice within an exposure, or are images processed? Number and diameters are wrong then"
     )
-    verdict = ShotVerdict.DOUBTFUL if shot.verdict is ShotVerdict.GOOD else shot.verdict
-    return replace(shot, verdict=verdict, reasons=(*shot.reasons, reason))
