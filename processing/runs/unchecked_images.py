@@ -20,6 +20,14 @@ PROPORTION = {
         "same cameras",
     ),
 }
+LAMPS = Unchecked(
+    "whether all views are in the same light: one is taken for all, and views of their own lamps, of 1 and of 1.5 "
+    "apertures of the lens, make diameters up to a sixth too large",
+    "lamps and apertures alike for all views; or --sizes: dots of known diameters, seen by the same cameras",
+)
+"""Of shadows in several views."""
+
+
 SCALE = Unchecked(
     "whether the image is whole, and as wide as it is high for equal lengths: of one view nothing tells one that was "
     "squeezed, or half covered",
@@ -150,6 +158,8 @@ def unchecked_images(
     """
     if polarity == "bright" or not sizes_known:
         yield PROPORTION[polarity]
+    if polarity == "shadow" and not sizes_known and not single:
+        yield LAMPS
     if single:
         yield SCALE
     if um_per_px is not None:
