@@ -40,8 +40,6 @@ MOST_HOLDOUT_PX, MOST_STRETCH = 5.0, 4.0
 """Points that a camera misses by more, while its pixels are so far from square, are those of no camera."""
 PLACEHOLDERS = 3
 """So many wrong points on one spot of the image stand for points that were not seen."""
-NOT_SEEN = "were these not seen?"
-"""What is asked of them then: it is no doubt of the view."""
 
 
 def calibrate(
@@ -160,7 +158,7 @@ def _placeholders(wrong_px: FloatArray) -> Iterator[str]:
     spots_px, counts = np.unique(wrong_px, axis=0, return_counts=True)
     for (u, v), count in zip(spots_px, counts, strict=True):
         if count >= PLACEHOLDERS:
-            yield f"{count} points that were left out lie on one spot ({u:g}, {v:g}): {NOT_SEEN}"
+            yield f"{count} points that were left out lie on one spot ({u:g}, {v:g}): were these not seen?"
 
 
 def _free_view(seen: ViewObservations, wanted: Model | None) -> ViewCalibration:

@@ -3,10 +3,9 @@
 from collections.abc import Iterable
 
 from daq.files.header import RunHeader
-from processing.calibration.calibrate import NOT_SEEN
-from processing.calibration.calibration import Calibration, ViewCalibration
+from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.disparity import measured_box
-from processing.calibration.fit.health import shortfalls
+from processing.calibration.fit.health import judge
 from processing.calibration.fit.scale_check import SCALE_TOLERANCE, scale_px_per_mm
 from processing.calibration.sets.recorded_set import nominal_scales
 from processing.calibration.verdict import Verdict
@@ -29,15 +28,11 @@ def own_doubt(calibration: Calibration, names: Iterable[str]) -> str:
     """What a calibration says against one of these views beside its hold-out error, which droplets tell anew."""
     for name in names:
         view = calibration.views.get(name)
-        if view and view.verdict is Verdict.WARN and (own := _beside_holdout(view)):
-            return f"calibration {calibration.id} says so itself, {name}: warn: {own[-1]}"
+        if view is None or view.verdict is not Verdict.WARN:
+            continue
+        if judge(view.holdout_error_px, view.n_rejected / max(1, view.n_rejected + view.n_points)) is not Verdict.WARN:
+            return f"calibration {calibration.id} says so itself, {name}: {': '.join(('warn', *view.reasons[-1:]))}"
     return ""
-
-
-def _beside_holdout(view: ViewCalibration) -> list[str]:
-    """Reasons of a view after those of its hold-out error, and but for points that nobody saw, which are left out."""
-    of_holdout = shortfalls(view.holdout_error_px, view.n_rejected, max(1, view.n_points))
-    return [reason for reason in view.reasons[len(of_holdout) :] if not reason.endswith(NOT_SEEN)]
 
 
 def other_scale(header: RunHeader, calibration: Calibration) -> str:
