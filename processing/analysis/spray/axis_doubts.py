@@ -31,18 +31,20 @@ RING = 16
 """Places around the axis that must all be in the box."""
 
 
-def axis_doubts(sample: SpraySample, axis: SprayAxis, proposed: ProposedAxis | None) -> tuple[str, ...]:
-    """Say what contradicts a stated axis.
+def axis_doubts(sample: SpraySample, axis: SprayAxis | None, proposed: ProposedAxis | None) -> tuple[str, ...]:
+    """Say what contradicts a stated axis; where none is, that droplets of two nozzles have no common one.
 
     Parameters
     ----------
     sample : SpraySample
         The droplets, one at least.
-    axis : SprayAxis
+    axis : SprayAxis | None
         As stated.
     proposed : ProposedAxis | None
         What the droplets say by themselves.
     """
+    if axis is None:
+        return tuple(_of_two_places(sample, proposed.believed)) if proposed and proposed.believed else ()
     coarse = tuple(_of_places(sample, axis))
     if coarse:
         return coarse
@@ -132,8 +134,8 @@ def _of_two_places(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:
     near = off_mm <= WILD * np.median(off_mm)
     if apart_mm := _two_heaps_mm(flying.chosen(near), crossed_mm[near]):
         yield (
-            f"droplets come from places {apart_mm:.2g} mm apart, on both sides of the stated nozzle: are "
-            "they of two sprays? Angles and shares are of none of them; measure a box around each"
+            f"droplets come from places {apart_mm:.2g} mm apart, on both sides of the nozzle: are they "
+            "of two sprays? Angles and shares are of none of them; measure a box around each"
         )
 
 

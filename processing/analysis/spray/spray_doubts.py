@@ -72,7 +72,7 @@ def spray_doubts(
         *(_of_motion(sample, axis) if sample else ()),
         *(_of_unpaired(sample) if sample else ()),
         *(_of_pressure(shots, sample) if sample else ()),
-        *(axis_doubts(sample, axis, proposed) if sample and axis and len(sample) else ()),
+        *(axis_doubts(sample, axis, proposed) if sample and len(sample) else ()),
     )
 
 

@@ -131,11 +131,9 @@ def test_a_fan_that_the_box_cuts_to_one_side_has_no_axis_but_a_nozzle() -> None:
     assert CUT in found.words
 
 
-@pytest.mark.parametrize("apart_mm", [2.0, 4.0])
-def test_two_nozzles_around_the_stated_one_are_told(apart_mm: float) -> None:
-    """Scatter of flights, 0.4 mm at the nozzle, hides no heaps 2 mm apart."""
-    left, right = (cone(one, 8.0, nozzle_mm=((one - 0.5) * apart_mm, 0, 0)) for one in range(2))
-    both = SpraySample(
+def of_two_nozzles(apart_mm: float, half_deg: float) -> SpraySample:
+    left, right = (cone(one, half_deg, nozzle_mm=((one - 0.5) * apart_mm, 0, 0)) for one in range(2))
+    return SpraySample(
         diameters_um=np.concatenate([left.diameters_um, right.diameters_um]),
         points_mm=np.concatenate([left.points_mm, right.points_mm]),
         velocities_m_s=np.concatenate([left.velocities_m_s, right.velocities_m_s]),
@@ -143,7 +141,20 @@ def test_two_nozzles_around_the_stated_one_are_told(apart_mm: float) -> None:
         volumes_mm3=left.volumes_mm3,
         box_mm=BOX_MM,
     )
-    assert f"droplets come from places {apart_mm:.0f} mm apart" in told(both)
+
+
+@pytest.mark.parametrize("apart_mm", [2.0, 4.0])
+def test_two_nozzles_around_the_stated_one_are_told(apart_mm: float) -> None:
+    """Scatter of flights, 0.4 mm at the nozzle, hides no heaps 2 mm apart."""
+    assert f"droplets come from places {apart_mm:.0f} mm apart" in told(of_two_nozzles(apart_mm, 8.0))
+
+
+def test_two_nozzles_for_which_one_is_proposed_are_told() -> None:
+    both = of_two_nozzles(2.0, 15.0)
+    proposed = proposed_axis(both)
+    assert proposed.believed is not None
+    assert "droplets come from places 2 mm apart" in "".join(axis_doubts(both, None, proposed))
+    assert axis_doubts(cone(), None, proposed_axis(cone())) == ()
 
 
 @pytest.mark.parametrize("swirl", [0.1, 0.4])
