@@ -5,6 +5,7 @@ A figure is no better than the shots that it comes from. Each of these is told b
 
 import json
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -164,8 +165,16 @@ def _by_all_sizes(sums: FloatArray) -> FloatArray:
     """Mean speed of all, if those of a size fly alike, over that of those with a velocity, (rows, 1)."""
     n, paired, speeds = np.split(sums, 3, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        by_size = (n * speeds / paired).sum(axis=1) / n.sum(axis=1)
+        by_size = (n * _as_next_to(speeds / paired)).sum(axis=1) / n.sum(axis=1)
         return np.asarray(by_size * paired.sum(axis=1) / speeds.sum(axis=1))[:, None]
+
+
+def _as_next_to(means: FloatArray) -> FloatArray:
+    """Of sizes without any, (rows, sizes), those of the next smaller one that has some, or of the next larger one."""
+    filled = means.copy()
+    for size, other in (*pairwise(range(SIZES)), *pairwise(reversed(range(SIZES)))):
+        filled[:, other] = np.where(np.isnan(filled[:, other]), filled[:, size], filled[:, other])
+    return filled
 
 
 def _of_pressure(shots: Sequence[StoredDroplets], sample: SpraySample) -> Iterator[str]:

@@ -222,3 +222,11 @@ def test_velocities_that_large_droplets_lack_are_told_with_what_they_would_make(
     assert float(told.split(" but ")[1].split()[0]) == pytest.approx(true, rel=0.01)
     by_chance = [rng.random(len(one)) < 0.4 for one in d_um]
     assert not doubts(*map(losing, shots, by_chance))
+
+
+def test_velocities_that_none_of_the_largest_droplets_has_are_told_too() -> None:
+    """They are counted as fast as the next smaller ones."""
+    shots = cone_shots(1, 6, 300)
+    told = doubts(*(losing(one, np.asarray(one.columns["diameter_um"], float) > 45) for one in shots))
+    assert "have no velocity, and are of other sizes" in told
+    assert not doubts(*shots)
