@@ -1,5 +1,6 @@
 """Verdict: what a view is good for, what speaks against it, and what nothing told."""
 
+import re
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -40,6 +41,19 @@ class Doubt:
     views: tuple[str, ...]
     text: str
     verdict: Verdict = Verdict.WARN
+
+
+_SHOT = "shot {} of run {}: "
+
+
+def doubt_of_shot(views: tuple[str, ...], shot: int, run: str, problem: str, verdict: Verdict) -> Doubt:
+    """What the droplets of a shot say against views."""
+    return Doubt(views, f"{_SHOT.format(shot, run)}{problem}", verdict)
+
+
+def is_of_shot(reason: str) -> bool:
+    """Whether droplets have said so: a view that they have corrected since is another one."""
+    return re.match(re.escape(_SHOT).replace(r"\{\}", r"\S+"), reason) is not None
 
 
 @with_config(ConfigDict(extra="forbid", allow_inf_nan=False))

@@ -16,7 +16,7 @@ from processing.calibration.droplets.self_calibration import SelfCalibration
 from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.not_checked import DROPLETS
 from processing.calibration.sets.calibration_set import SET_FILE
-from processing.calibration.verdict import Doubt, Verdict
+from processing.calibration.verdict import Doubt, Verdict, doubt_of_shot
 from processing.progress import Counted, in_silence
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError
@@ -149,7 +149,7 @@ def _doubt(run: str, check: ShotCheck, verdict: Verdict) -> Doubt:
     """What the droplets of a shot say of the views that it names, or of all."""
     views = (check.moved,) if check.moved else check.beyond or tuple(check.views)
     problem = check.problem or f"droplets are seen {check.worst_px:.2g} px beside where the other views put them"
-    return Doubt(views, f"shot {check.shot} of run {run}: {problem}", verdict)
+    return doubt_of_shot(views, check.shot, run, problem, verdict)
 
 
 def self_calibrate_run(

@@ -27,7 +27,7 @@ from processing.calibration.droplets.motion_fit import FAINTEST, largest_uncerta
 from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.health import judge
 from processing.calibration.triangulation import linearise, unseen
-from processing.calibration.verdict import Doubt, worse
+from processing.calibration.verdict import Doubt, is_of_shot, worse
 from processing.geometry import FloatArray, ViewMapping
 
 DIVISIONS = ((3, 3, 3), (2, 2, 2))
@@ -118,7 +118,7 @@ def self_calibrate(
     views = {
         name: _corrected_view(view, mapping, distance_px, left_px)
         for (name, view), mapping, distance_px, left_px in zip(
-            calibration.views.items(), mappings, distances_px, after_px, strict=True
+            _as_calibrated(calibration.views, distances_px).items(), mappings, distances_px, after_px, strict=True
         )
     }
     return SelfCalibration(
@@ -266,4 +266,19 @@ def _corrected_view(view: ViewCalibration, mapping: ViewMapping, distance_px: fl
     holdout_px = max(view.holdout_error_px, left_px)
     corrected = replace(view, mapping=mapping, holdout_error_px=holdout_px, covariance=None)
     left = Doubt((), f"droplets disagree by {left_px:.2g} px after the correction", judge(holdout_px))
-    return corrected if worse(view.verdict, left.verdict) is view.verdict else corrected.doubted(left)
+    agrees = worse(corrected.verdict, left.verdict) is corrected.verdict
+    return corrected if agrees else corrected.doubted(left)
+
+
+def _as_calibrated(views: Mapping[str, ViewCalibration], distances_px: Sequence[float]) -> dict[str, ViewCalibration]:
+    """Views without what droplets have said against them, once any view is corrected: they are asked anew."""
+    return {name: _of_target(view) if any(distances_px) else view for name, view in views.items()}
+
+
+def _of_target(view: ViewCalibration) -> ViewCalibration:
+    """A view with what its target says alone."""
+    reasons = tuple(reason for reason in view.reasons if not is_of_shot(reason))
+    if reasons == view.reasons:
+        return view
+    rejected = view.n_rejected / max(1, view.n_rejected + view.n_points)
+    return replace(view, reasons=reasons, verdict=view.verdict if reasons else judge(view.holdout_error_px, rejected))

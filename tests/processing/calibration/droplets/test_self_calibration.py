@@ -12,6 +12,7 @@ from processing.calibration.droplets.mapping_correction import corrected, correc
 from processing.calibration.droplets.self_calibration import SelfCalibration, self_calibrate
 from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.polynomial import fit_polynomial
+from processing.calibration.verdict import Doubt, Verdict, doubt_of_shot
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 from processing.studies.drifting_views import direction
 from tests.support.drifting_views import HALF_MM, SIZE_PX, calibration_of, droplet_shots, inside_mm, views
@@ -30,14 +31,16 @@ def rolled(angle_rad: float) -> Drift:
     return lambda image_px: (image_px - centre_px) @ turn + centre_px
 
 
-def recalibrate(drifts: dict[int, Drift], mappings: list[ViewMapping] | None = None) -> SelfCalibration:
+def recalibrate(
+    drifts: dict[int, Drift], mappings: list[ViewMapping] | None = None, doubts: tuple[Doubt, ...] = ()
+) -> SelfCalibration:
     """Calibrated before the drifts, shots taken after them."""
     drifted = [
         tuple(drifts[view](points_px) if view in drifts else points_px for view, points_px in enumerate(shot))
         for shot in droplet_shots(SHOTS)
     ]
     model = Model.PINHOLE if mappings is None else Model.POLYNOMIAL
-    return self_calibrate(calibration_of(mappings or views(), model), drifted, "run-7")
+    return self_calibrate(calibration_of(mappings or views(), model).doubted(doubts), drifted, "run-7")
 
 
 def errors_px(result: SelfCalibration, drifts: dict[int, Drift]) -> FloatArray:
@@ -106,6 +109,18 @@ def test_good_calibration_hardly_changes() -> None:
     result = recalibrate({})
     assert max(result.corrections_px.values()) == 0.0
     assert result.calibration.notes[-1].endswith("the views agree, nothing moved")
+
+
+@pytest.mark.parametrize("moves", [True, False])
+def test_what_droplets_said_ends_with_the_correction_and_what_the_target_said_stays(moves: bool) -> None:
+    said = doubt_of_shot(("view1", "view2"), 0, "run-6", "droplets are seen 2 px beside", Verdict.WARN)
+    other = Doubt(("view2",), "its scale is another one than the rig's", Verdict.WARN)
+    result = recalibrate({0: shifted(2.0, 0.0)} if moves else {}, doubts=(said, other))
+    first, second = (result.calibration.views[name] for name in ("view1", "view2"))
+    assert (said.text in first.reasons, said.text in second.reasons) == (not moves, not moves)
+    assert (first.verdict is Verdict.WARN) is not moves
+    assert other.text in second.reasons
+    assert second.verdict is Verdict.WARN
 
 
 def test_new_file_names_its_parent(tmp_path: Path) -> None:
