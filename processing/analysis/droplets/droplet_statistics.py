@@ -10,8 +10,8 @@ from pydantic import Field
 
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.ghost_share import BESIDE_LIQUID, MANY_OBJECTS, told_share
-from processing.analysis.droplets.size_statistics import SizeStatistics, mean_diameters, shots_density
-from processing.analysis.estimates import MANY, Estimate, reach
+from processing.analysis.droplets.size_statistics import SizeStatistics, in_its_light, mean_diameters, shots_density
+from processing.analysis.estimates import Estimate
 from processing.reconstruction.settings import GridSettings
 from processing.volume import VoxelGrid
 
@@ -154,20 +154,13 @@ def _sizes(shots: Sequence[StoredDroplets], per_shot: float) -> SizeStatistics:
     for shot, its_um in zip(shots, diameters_um, strict=True):
         if not (np.isfinite(its_um) & (its_um > 0)).all():
             raise DropletFileError(f"{shot.name}: was changed: a diameter is not finite, or not above 0")
-    return _in_its_light(mean_diameters(diameters_um, per_shot), _light_sd_um(shots))
+    return in_its_light(mean_diameters(diameters_um, per_shot), _light_sd_um(shots))
 
 
 def _light_sd_um(shots: Sequence[StoredDroplets]) -> float:
     """What all diameters share because the light is not known better: no mean takes it out."""
     views = (list(one.get("views", {}).values()) for shot in shots for one in told_exposures(shot))
     return float(np.mean([max((view.get("light_sd_um", 0.0) for view in seen), default=0.0) for seen in views]))
-
-
-def _in_its_light(sizes: SizeStatistics, light_sd_um: float) -> SizeStatistics:
-    """The same with intervals that hold that, too."""
-    told = {name: one for name, one in dict(sizes).items() if name.endswith("_um") and isinstance(one, Estimate)}
-    wider = {name: one.less_sure(reach(MANY) * light_sd_um / one.value) for name, one in told.items()}
-    return sizes.model_copy(update={"light_sd_um": light_sd_um, **wider}) if light_sd_um else sizes
 
 
 def _density(

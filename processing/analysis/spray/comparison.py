@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import Field
 from scipy.special import stdtr, stdtrit
 
+from processing.analysis.droplets.size_statistics import by_shots
 from processing.analysis.estimates import CONFIDENCE, Estimate, reach
 from processing.analysis.spray.spray_statistics import SprayStatistics
 from processing.reconstruction.settings import FrozenValue
@@ -69,8 +70,9 @@ def _told(statistics: SprayStatistics) -> dict[str, _Told]:
     shots = statistics.droplets.shots
     if shots < 2:
         return {}
-    parts = ((statistics.droplets, OF_DROPLETS), (statistics.motion, OF_MOTION), (statistics.extent, OF_EXTENT))
+    parts = ((statistics.motion, OF_MOTION), (statistics.extent, OF_EXTENT))
     estimates = {name: getattr(part, name) for part, names in parts if part for name in names}
+    estimates |= {name: by_shots(statistics.droplets, name) for name in OF_DROPLETS}
     estimates["liquid_ppm"] = statistics.liquid_ppm
     return {
         name: _Told(float(np.log(one.value)), (one.high - one.low) / (2 * one.value * reach(shots)), shots - 1)

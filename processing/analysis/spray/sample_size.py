@@ -13,8 +13,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from processing.analysis.droplets.size_statistics import SizeStatistics
-from processing.analysis.estimates import CONFIDENCE, MANY, reach
+from processing.analysis.droplets.size_statistics import SizeStatistics, by_shots
+from processing.analysis.estimates import CONFIDENCE, MANY, Estimate, reach
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.reconstruction.settings import FrozenValue
 
@@ -54,12 +54,12 @@ def sample_verdict(sample: SpraySample, sizes: SizeStatistics) -> SampleVerdict:
     sizes : SizeStatistics
         Their diameters, with 95 % intervals.
     """
-    half_width, by_shots = _half_width(sizes), _half_width_by_shots(sizes)
+    half_width, shots_alone = _half_width(sizes.d32_um), _half_width(by_shots(sizes, "d32_um"))
     share, largest_um, without_um = extreme_droplet(sample)
     needed = None
-    if by_shots is not None and sizes.intervals_over == "shots":
+    if shots_alone is not None and sizes.intervals_over == "shots":
         counted = sizes.shots * (_counted_half_width(sample) / LARGEST_HALF_WIDTH) ** 2
-        needed = max(shots_needed(by_shots, sizes.shots), ceil(counted), FEWEST_SHOTS)
+        needed = max(shots_needed(shots_alone, sizes.shots), ceil(counted), FEWEST_SHOTS)
     reasons = tuple(_reasons(sizes, share, half_width, needed))
     return SampleVerdict(
         verdict="low sample" if reasons else "adequate",
@@ -89,17 +89,8 @@ def shots_needed(half_width: float, shots: int) -> int:
     return needed
 
 
-def _half_width(sizes: SizeStatistics) -> float | None:
-    d32 = sizes.d32_um
+def _half_width(d32: Estimate | None) -> float | None:
     return None if d32 is None else float(np.log(d32.high / d32.low) / 2)
-
-
-def _half_width_by_shots(sizes: SizeStatistics) -> float | None:
-    """The same less what the light is not known to: more shots do not tell it."""
-    half_width, d32 = _half_width(sizes), sizes.d32_um
-    if half_width is None or d32 is None:
-        return None
-    return sqrt(max(half_width**2 - (reach(MANY) * sizes.light_sd_um / d32.value) ** 2, 0.0))
 
 
 def _counted_half_width(sample: SpraySample) -> float:

@@ -7,9 +7,11 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from processing.analysis.copied_shots import in_common
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
-from processing.analysis.droplets.droplet_statistics import measured_grid, require_poolable
+from processing.analysis.droplets.droplet_statistics import measured_grid, require_poolable, told_exposures
 from processing.analysis.lingering_droplets import lingering_told
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_doubts import NOT_STATED, noted
@@ -172,9 +174,7 @@ def read_compared(folders: Sequence[Path]) -> ComparedSprays:
         raise DropletFileError(
             f"{', '.join(map(str, folders))}: to compare takes two directories at least, of different names"
         )
-    unlike = _differing(
-        sprays, lambda one: {**_made_by(one.provenance), **_separation(one.shots), **_box(one.shots)}, "differ in {}"
-    )
+    unlike = _differing(sprays, _measured, "differ in {}")
     conditions = _differing(sprays, lambda one: noted(one.shots), "are sprays of other conditions: {}")
     return ComparedSprays(named, (*unlike, *_elsewhere(sprays), *_shared(sprays), *_lingering(sprays)), conditions)
 
@@ -219,6 +219,12 @@ def _differences(its: Mapping[str, object], others: Mapping[str, object]) -> str
     )
 
 
+def _measured(spray: MeasuredSpray) -> dict[str, object]:
+    """How it was measured."""
+    shots = spray.shots
+    return {**_made_by(spray.provenance), **_separation(shots), **_box(shots), **_light(shots)}
+
+
 def _made_by(provenance: Mapping[str, Any]) -> dict[str, object]:
     """What a measurement depends on."""
     names = ("calibration", "method_version")
@@ -233,6 +239,16 @@ def _separation(shots: Sequence[StoredDroplets]) -> dict[str, object]:
     known = [(one["separation_ns"] / 1000, one["separation_source"]) for one in velocities if "separation_ns" in one]
     apart = dict.fromkeys(f"{us:.4g} us as {source}" for us, source in known)
     return {"separation": " and ".join(apart)} if apart else {}
+
+
+def _light(shots: Sequence[StoredDroplets]) -> dict[str, object]:
+    """In which light their shadows are read: in another one diameters differ, and shots do not scatter by it."""
+    views = [view for shot in shots for one in told_exposures(shot) for view in one.get("views", {}).values()]
+    ratios = [float(view["condenser_ratio"] or 0) for view in views if "condenser_ratio" in view]
+    if not ratios:
+        return {}
+    middle = float(np.median(ratios))
+    return {"light": f"{middle:.2g} apertures of the lens" if middle else "a Gaussian blur"}
 
 
 def _box(shots: Sequence[StoredDroplets]) -> dict[str, object]:

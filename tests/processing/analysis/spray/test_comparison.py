@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.size_statistics import in_its_light
 from processing.analysis.spray.comparison import _holm, differences
 from processing.analysis.spray.spray_statistics import spray_statistics
 from tests.support.sampled_sprays import stored_shot
@@ -36,6 +37,19 @@ def test_a_larger_spray_is_larger() -> None:
     assert d32.ratio.low < 1.25 < d32.ratio.high
     assert not found["number_density_per_mm3"].significant
     assert all(one.p_value <= one.p_corrected <= 1 for one in found.values())
+
+
+def test_what_the_light_is_not_known_to_hides_no_difference() -> None:
+    """Both runs are in it: it makes their diameters wrong, but wrong alike."""
+    rng = np.random.default_rng(1)
+    runs = {name: spray_statistics(run(rng, median_um)) for name, median_um in (("fine", 40.0), ("coarse", 50.0))}
+    unsure = {
+        name: one.model_copy(update={"droplets": one.droplets.model_copy(update=dict(in_its_light(one.droplets, 5.0)))})
+        for name, one in runs.items()
+    }
+    assert unsure["fine"].droplets.d32_um != runs["fine"].droplets.d32_um
+    sure = {one.figure: one.p_value for one in differences(runs)}
+    assert {one.figure: one.p_value for one in differences(unsure)} == pytest.approx(sure)
 
 
 def test_a_run_of_one_shot_is_not_compared() -> None:
