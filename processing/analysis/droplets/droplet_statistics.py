@@ -10,7 +10,8 @@ from pydantic import Field
 
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.ghost_share import BESIDE_LIQUID, MANY_OBJECTS, told_share
-from processing.analysis.droplets.size_statistics import SizeStatistics, in_its_light, mean_diameters, shots_density
+from processing.analysis.droplets.size_statistics import SizeStatistics, mean_diameters, shots_density
+from processing.analysis.droplets.sizes_in_light import in_its_light
 from processing.analysis.estimates import Estimate
 from processing.reconstruction.settings import GridSettings
 from processing.volume import VoxelGrid

@@ -23,10 +23,8 @@ from processing.analysis.estimates import (
     COUNTED_DRAWS,
     DRAWS,
     FEW_SHOTS,
-    MANY,
     Estimate,
     estimated,
-    reach,
     weighted_quantiles,
 )
 from processing.geometry import FloatArray
@@ -268,26 +266,6 @@ def _estimates(
     if SPAN in known:
         known[SPAN] = known[SPAN].model_copy(update={"low": max(known[SPAN].low, 0.0)})
     return known
-
-
-def in_its_light(sizes: SizeStatistics, light_sd_um: float) -> SizeStatistics:
-    """The same with intervals that hold what the light is not known to, too; no mean takes it out."""
-    if not light_sd_um:
-        return sizes
-    told = {name: one for name, one in dict(sizes).items() if name.endswith("_um") and isinstance(one, Estimate)}
-    wider = {name: one.less_sure(_of_light(light_sd_um, one)) for name, one in told.items()}
-    return sizes.model_copy(update={"light_sd_um": light_sd_um, **wider})
-
-
-def by_shots(sizes: SizeStatistics, name: str) -> Estimate | None:
-    """A figure with the interval that shots alone give it: all shots, and all runs of a rig, are in one light."""
-    one: Estimate | None = getattr(sizes, name)
-    return one.without(_of_light(sizes.light_sd_um, one)) if one and name.endswith("_um") and sizes.light_sd_um else one
-
-
-def _of_light(light_sd_um: float, figure: Estimate) -> float:
-    """Half of a 95 % interval over the figure."""
-    return reach(MANY) * light_sd_um / figure.value
 
 
 def _known(estimates: dict[str, Estimate], diameters_um: FloatArray, fewest: float) -> dict[str, Estimate]:

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 from scipy.special import stdtr, stdtrit
 
-from processing.analysis.droplets.size_statistics import by_shots
+from processing.analysis.droplets.sizes_in_light import by_shots
 from processing.analysis.estimates import CONFIDENCE, Estimate, reach
 from processing.analysis.spray.spray_statistics import SprayStatistics
 from processing.reconstruction.settings import FrozenValue

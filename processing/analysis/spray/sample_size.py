@@ -13,7 +13,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from processing.analysis.droplets.size_statistics import SizeStatistics, by_shots
+from processing.analysis.droplets.size_statistics import SizeStatistics
+from processing.analysis.droplets.sizes_in_light import by_shots
 from processing.analysis.estimates import CONFIDENCE, MANY, Estimate, reach
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.reconstruction.settings import FrozenValue

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
-from processing.analysis.droplets.size_statistics import in_its_light
+from processing.analysis.droplets.sizes_in_light import in_its_light
 from processing.analysis.spray.comparison import _holm, differences
 from processing.analysis.spray.spray_statistics import spray_statistics
 from tests.support.sampled_sprays import stored_shot
