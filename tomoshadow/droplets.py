@@ -88,8 +88,9 @@ def measure(
     seen, doubts = list(images.values()), tuple(filter(None, [own_doubt(calibration, names)]))
     if polarity == "shadow":
         shadows = measure_shadows(seen, search, light=light, twins=twins, seed=seed, threads=threads)
-        return shadows.doubted(doubts)
-    return measure_bright(seen, search, twins=twins, seed=seed, threads=threads).doubted(doubts)
+        return shadows.doubted(doubts, before=True)
+    bright = measure_bright(seen, search, twins=twins, seed=seed, threads=threads)
+    return bright.doubted(doubts, before=True)
 
 
 def _require_options(polarity: Polarity, light: Light) -> None:

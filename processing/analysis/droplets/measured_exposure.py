@@ -86,12 +86,16 @@ class MeasuredExposure(Generic[Rows, Seen]):
             "hidden": asdict(self.hidden),
         }
 
-    def doubted(self, reasons: tuple[str, ...]) -> "MeasuredExposure[Rows, Seen]":
-        """The same with reasons why it is no good, if there are any; an empty one may not be empty then."""
+    def doubted(self, reasons: tuple[str, ...], *, before: bool = False) -> "MeasuredExposure[Rows, Seen]":
+        """The same with reasons why it is no good, if there are any; before all others, where they may explain these.
+
+        An empty one may not be empty then.
+        """
         if not reasons:
             return self
         verdict = ShotVerdict.REFUSED if self.verdict is ShotVerdict.REFUSED else ShotVerdict.DOUBTFUL
-        return replace(self, verdict=verdict, reasons=(*reasons, *self.reasons))
+        told = (*reasons, *self.reasons) if before else (*self.reasons, *reasons)
+        return told_real(replace(self, verdict=verdict, reasons=told))
 
 
 def told_real(shot: MeasuredExposure[Rows, Seen]) -> MeasuredExposure[Rows, Seen]:

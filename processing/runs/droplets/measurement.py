@@ -215,7 +215,7 @@ class RunMeasurement:
         exposure, lights, reasons = measure(shot, frame, threads, before_round)
         sights = sights_in(self.calibration, list(shot.views), lights) if frame != "b" else {}
         doubts = (depth_reversed(sights), untold_doubt(self.run.header, self.calibration))
-        return exposure.doubted((*reasons, *filter(None, doubts))), sights
+        return exposure.doubted((*reasons, *filter(None, doubts)), before=True), sights
 
     def _bright(self, shot: Shot, frame: FrameName, threads: int, before_round: Callable[[], None]) -> _Found:
         images = bright_images(self.run, shot, frame, self.references)

@@ -1,7 +1,6 @@
 """What speaks against an exposure of shadows: its light, what discs leave of it, shadows that are grey or not round."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -133,10 +132,8 @@ def _fringe_doubts(seen: DiscImages, shadows: Shadows) -> tuple[str, ...]:
 
 def judged_by_shape(shot: MeasuredExposure[SizedDroplets, Seen]) -> MeasuredExposure[SizedDroplets, Seen]:
     """A shot, doubtful where many droplets do not look as round opaque discs do, however small they are."""
-    if not (reason := unlike_discs(shot.droplets.residual)):
-        return shot
-    verdict = ShotVerdict.DOUBTFUL if shot.verdict is ShotVerdict.GOOD else shot.verdict
-    return replace(shot, verdict=verdict, reasons=(*shot.reasons, reason))
+    reason = unlike_discs(shot.droplets.residual)
+    return shot.doubted((reason,)) if reason else shot
 
 
 def unlike_discs(residual: FloatArray) -> str:

@@ -1,12 +1,10 @@
 """Whether droplets have company that no chance gives: streaks and saturated spots are explained by several droplets."""
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.spatial import cKDTree
 
 from processing.analysis.droplets.droplet_table import Droplets
-from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
+from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen
 from processing.volume import VoxelGrid
 
 NEAR_VOXEL = 4.0
@@ -34,5 +32,4 @@ def judged_by_company(shot: MeasuredExposure[Droplets, Seen], grid: VoxelGrid) -
         f"{100 * MOST_COMPANY:.0f} %: do they move while the light is on, are they saturated, or wider than spots? "
         "Their number is wrong then"
     )
-    verdict = ShotVerdict.DOUBTFUL if shot.verdict is ShotVerdict.GOOD else shot.verdict
-    return replace(shot, verdict=verdict, reasons=(*shot.reasons, reason))
+    return shot.doubted((reason,))

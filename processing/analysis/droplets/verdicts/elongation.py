@@ -6,7 +6,7 @@ it reaches along the rows, and along the columns. Discs that overlap in space ar
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.measured_exposure import MeasuredExposure, Rows, Seen, ShotVerdict
+from processing.analysis.droplets.measured_exposure import MeasuredExposure, Rows, Seen
 from processing.geometry import FloatArray
 
 FEWEST, MOST = 3, 300
@@ -135,10 +135,7 @@ def judged_by_length(
 ) -> MeasuredExposure[Rows, Seen]:
     """An exposure, doubtful where shadows are so much longer than wide that sizes are wrong."""
     reason, is_wrong = elongation_told([one for one in views if one is not None])
-    if not is_wrong:
-        return exposure
-    verdict = ShotVerdict.DOUBTFUL if exposure.verdict is ShotVerdict.GOOD else exposure.verdict
-    return replace(exposure, verdict=verdict, reasons=(*exposure.reasons, f"{reason}{WRONG}"))
+    return exposure.doubted((f"{reason}{WRONG}",)) if is_wrong else exposure
 
 
 def _whole(

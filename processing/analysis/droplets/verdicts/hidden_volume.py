@@ -1,8 +1,6 @@
 """Whether most of the volume could be measured."""
 
-from dataclasses import replace
-
-from processing.analysis.droplets.measured_exposure import MeasuredExposure, Rows, Seen, ShotVerdict
+from processing.analysis.droplets.measured_exposure import MeasuredExposure, Rows, Seen
 
 MOST_HIDDEN = 0.5
 """Share of the volume that may be hidden."""
@@ -18,4 +16,4 @@ def judged_by_volume(shot: MeasuredExposure[Rows, Seen]) -> MeasuredExposure[Row
         if shot.hidden.liquid_objects
         else f"too few views see {share}: take a box that all of them see (--grid)"
     )
-    return replace(shot, verdict=ShotVerdict.DOUBTFUL, reasons=(*shot.reasons, reason))
+    return shot.doubted((reason,))

@@ -6,7 +6,7 @@ import numpy as np
 
 from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.ghost_share import GhostShare, matches
-from processing.analysis.droplets.measured_exposure import MeasuredExposure, Rows, Seen, ShotVerdict
+from processing.analysis.droplets.measured_exposure import MeasuredExposure, Rows, Seen
 from processing.geometry import FloatArray
 
 MANY_GHOSTS = 0.1
@@ -17,13 +17,14 @@ TWIN_MOVE_VOXEL = 15.0
 
 def judged_by_twins(shot: MeasuredExposure[Rows, Seen], ghosts: GhostShare) -> MeasuredExposure[Rows, Seen]:
     """A shot with the ghosts of its twins; doubtful where they are many, however well droplets explain the images."""
+    shot = replace(shot, twins=ghosts)
     if ghosts.share is None or ghosts.share <= MANY_GHOSTS:
-        return replace(shot, twins=ghosts)
+        return shot
     reason = (
         f"of the droplets of a twin {100 * ghosts.share:.0f} % are ghosts, limit {100 * MANY_GHOSTS:.0f} %: too many "
         "droplets for so few views"
     )
-    return replace(shot, twins=ghosts, verdict=ShotVerdict.DOUBTFUL, reasons=(*shot.reasons, reason))
+    return shot.doubted((reason,))
 
 
 def ghosts_within(found_voxel: FloatArray, truth_voxel: FloatArray, search: DropletSearch) -> GhostShare:

@@ -44,3 +44,14 @@ def test_beside_ligaments_they_are_the_reason_in_one_sentence() -> None:
 def test_of_a_doubtful_exposure_the_doubt_is_the_reason() -> None:
     told = reason(exposure(145), exposure(133, ShotVerdict.DOUBTFUL, "it is blurred"))
     assert told.endswith("; it is blurred")
+
+
+def test_whoever_doubts_an_exposure_no_droplet_of_it_is_told_to_be_real() -> None:
+    """Its calibration, or exposure B, are asked once all is measured."""
+    good = exposure(3)
+    good = replace(good, droplets=replace(good.droplets, p_real=np.full(3, 0.9)))
+    doubted = good.doubted(("another scale",))
+    assert (doubted.verdict, good.doubted(()).verdict) == (ShotVerdict.DOUBTFUL, ShotVerdict.GOOD)
+    assert np.isnan(doubted.droplets.p_real).all()
+    assert not np.isnan(good.doubted(()).droplets.p_real).any()
+    assert doubted.doubted(("first",), before=True).reasons == ("first", "another scale")
