@@ -157,7 +157,20 @@ def _of_sample(
         proposed_axis=proposed,
         patternations=patternations,
         density_maps=tuple(map(ToldDensity.of, density_maps(sample))),
+        corrections=(*CORRECTIONS, *_beyond_intervals(pooled)),
         reasons=_reasons(sample, proposed, bool(fits), motion is not None) | _missing(sample, asked, patternations),
+    )
+
+
+def _beyond_intervals(sizes: DropletStatistics) -> tuple[str, ...]:
+    """What intervals of liquid, flux and fits do not hold, though those of mean diameters do."""
+    if not (sizes.light_sd_um and sizes.d32_um):
+        return ()
+    share = sizes.light_sd_um / sizes.d32_um.value
+    return (
+        f"all diameters may be {sizes.light_sd_um:.2g} um wrong alike (one standard deviation), as the light is not "
+        "known better: intervals of mean diameters and quantiles by volume hold it; those of liquid and flux, which are "
+        f"{300 * share:.2g} % wrong with it, of fits, of flux-weighted diameters and of differences do not",
     )
 
 

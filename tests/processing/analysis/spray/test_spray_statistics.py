@@ -62,6 +62,20 @@ def test_sampling_is_stated_and_what_is_not_corrected(told: SprayStatistics) -> 
     assert told.reasons == {}
 
 
+def test_what_an_unsure_light_does_to_liquid_is_told(cone: list[StoredDroplets]) -> None:
+    """Volumes go with the third power: of D32 = 60 um, 2 um more are 10 % of the liquid."""
+
+    def seen(shot: StoredDroplets, light_sd_um: float) -> StoredDroplets:
+        exposures = json.loads(str(shot.provenance["exposures"]))
+        for one in exposures.values():
+            one["views"] = {"view1": {"light_sd_um": light_sd_um}}
+        return replace(shot, provenance={**shot.provenance, "exposures": json.dumps(exposures)})
+
+    sure, unsure = (spray_statistics([seen(shot, sd_um) for shot in cone], ASKED) for sd_um in (0.0, 2.0))
+    (line,) = set(unsure.corrections) - set(sure.corrections)
+    assert f"{100 * 3 * 2 / value(sure.droplets.d32_um):.2g} % wrong" in line
+
+
 def test_flux_and_density_are_what_the_droplets_carry(cone: list[StoredDroplets], told: SprayStatistics) -> None:
     """By hand: mean of 8 shots of 400 mm3 each."""
     assert told.motion
