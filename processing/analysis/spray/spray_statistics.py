@@ -169,7 +169,7 @@ def _beyond_intervals(sizes: DropletStatistics) -> tuple[str, ...]:
     share = sizes.light_sd_um / sizes.d32_um.value
     return (
         f"all diameters may be {sizes.light_sd_um:.2g} um wrong alike (one standard deviation), as the light is not "
-        "known better: intervals of mean diameters and quantiles by volume hold it; those of liquid and flux, which are "
+        "known better: intervals of mean diameters and quantiles hold it; those of liquid and flux, which are "
         f"{300 * share:.2g} % wrong with it, of fits, of flux-weighted diameters and of differences do not",
     )
 
