@@ -49,12 +49,21 @@ def read_reference(run_dir: Path, view: str, name: Reference) -> NDArray[np.floa
 
 
 def damaged_references(run_dir: Path, header: RunHeader) -> Iterator[str]:
-    """What is wrong with references, one text for each of them."""
+    """What is wrong with references, one text for each of them: damaged, or missing of some views only."""
+    known: dict[Reference, list[str]] = {name: [] for name in _NAMES}
     for view, name in product(header.views, _NAMES):
         try:
-            read_reference(run_dir, view, name)
+            if read_reference(run_dir, view, name) is not None:
+                known[name].append(view)
         except ShotFileError as error:
+            known[name].append(view)
             yield str(error)
+    for name, views in known.items():
+        if views and (missing := [view for view in header.views if view not in views]):
+            yield (
+                f"{run_dir / RUN_FILE}: no {name} of {', '.join(missing)}, and one of {', '.join(views)}: was it "
+                "removed? Copy the file back from a backup"
+            )
 
 
 def _check_reference(run_dir: Path, header: RunHeader, what: str, view: str, stack: NDArray[np.float32]) -> None:

@@ -99,6 +99,12 @@ def test_a_reference_that_was_changed_is_told(run_dir: Path) -> None:
         RunReader(run_dir).background("view2")
 
 
+def test_a_reference_of_one_view_that_was_removed_is_told(run_dir: Path) -> None:
+    edited(run_dir / "run.h5", lambda file: file.__delitem__("cameras/view2/background"))
+    (flaw,) = verify(run_dir).flaws
+    assert "no background of view2, and one of view1" in flaw.text
+
+
 def test_a_flipped_bit_of_a_reference_is_found_by_who_verifies(run_dir: Path) -> None:
     with h5py.File(run_dir / "run.h5") as file:
         chunk = file["cameras/view1/dark"].id.get_chunk_info(1)
