@@ -1,6 +1,6 @@
 """What may be wrong with images without showing in them: told with what is measured, and what to state."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict
 
 from daq.files.run_directory import RunHeader
@@ -105,6 +105,24 @@ def stated_rate(rate_hz: float) -> Unchecked:
         "and accelerations by its square; only velocities from A to B would contradict it",
         "rate_hz as the trigger has it, by a counter; double exposures with a separation tell velocities of their own",
     )
+
+
+MOST_ALONE = 0.05
+"""Share of the droplets of a double exposure that may lack a partner without a word."""
+
+
+def unlike_motions(shares_paired: Sequence[float]) -> list[Unchecked]:
+    """Of double exposures in which so many droplets of each have a partner."""
+    if not shares_paired or (alone := 1 - sum(shares_paired) / len(shares_paired)) <= MOST_ALONE:
+        return []
+    return [
+        Unchecked(
+            f"how the {100 * alone:.0f} % of the droplets fly that have no partner: in a second motion (another "
+            "stream, a wake, droplets too fast for the separation) mean velocity and flux are not those of all",
+            "a shorter separation, in which all droplets move by less than their neighbours are away; or a box around "
+            "each of the streams",
+        )
+    ]
 
 
 def even_rows(spacing_mm: float | None) -> list[Unchecked]:

@@ -25,7 +25,13 @@ def tell_unchecked(
     from processing.calibration.sets.recorded_set import nominal_scales
     from processing.reconstruction.planning.calibrated_plan import default_grid
     from processing.runs.shots.turned_views import reversed_shows_px
-    from processing.runs.unchecked_images import even_rows, told_unchecked, unchecked_images, unknown_crop
+    from processing.runs.unchecked_images import (
+        even_rows,
+        told_unchecked,
+        unchecked_images,
+        unknown_crop,
+        unlike_motions,
+    )
 
     with RunReader(run_dir) as run:
         cropped = unknown_crop(run.header)
@@ -45,4 +51,5 @@ def tell_unchecked(
         sparse=not depth_known(sights) and not depth_reversed(sights),
     )
     rows = even_rows(row_spacing_mm) if any(shot.velocity and shot.velocity.pairs for shot in shots) else []
-    return told_unchecked([*unchecked, *rows, *cropped], progress)
+    paired = [shot.velocity.share_paired for shot in shots if shot.velocity and shot.velocity.share_paired is not None]
+    return told_unchecked([*unchecked, *rows, *unlike_motions(paired), *cropped], progress)

@@ -82,6 +82,20 @@ def test_a_dark_image_that_is_too_bright_is_doubted(scene: ShadowScene) -> None:
     assert "% of the light below black" in "".join(told.reasons)
 
 
+@pytest.mark.parametrize("scattered", [True, False])
+def test_a_background_near_saturation_is_no_empty_view(scene: ShadowScene, scattered: bool) -> None:
+    """Nothing is known of a quarter of its pixels: here and there, or in a corner."""
+    rng = np.random.default_rng(5)
+    unknown = rng.random(scene.images[0].shape) < 0.25
+    if not scattered:
+        unknown = np.sort(unknown.ravel())[::-1].reshape(unknown.shape)
+    trust = [np.where(unknown, 0, 1).astype(np.float32), *(np.ones_like(image) for image in scene.images[1:])]
+    told = measure_shadows(scene.images, search_of(scene, MARGIN_VOXEL), trust=trust)
+    said = "; ".join(told.reasons)
+    assert ("nothing is known of 25 % of its pixels, here and there" in said.replace("25%", "25 %")) == scattered, said
+    assert (told.verdict is ShotVerdict.REFUSED) == scattered
+
+
 @pytest.fixture(scope="module")
 def small() -> ShadowScene:
     """Droplets of about two pixels, behind a blur of more than one: none is black in its middle."""
