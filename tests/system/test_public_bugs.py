@@ -108,7 +108,7 @@ def test_6_a_recording_server_that_hangs_or_dies_leaves_darkness_and_a_named_fau
         os.kill(first.pid, signal.SIGSTOP)
         time.sleep(0.5)  # what was on its way
         before = len(fired)
-        time.sleep(3.5)  # the heartbeat of the generator is over after 3 s
+        time.sleep(3.5)  # the generator gives its computer up after 3 s
         os.kill(first.pid, signal.SIGCONT)
         eventually(lambda: acquisition(first)["outcome"] == "failed", "the run has failed")
         causes = first.http.get(f"/api/runs/{acquisition(first)['run_id']}").json()["causes"]
@@ -121,6 +121,7 @@ def test_6_a_recording_server_that_hangs_or_dies_leaves_darkness_and_a_named_fau
         eventually(lambda: len(fired) > before, "there are shots again")
         first.kill()
         after = len(fired)
+        time.sleep(3.5)  # a server that comes back within the heartbeat would find no fault
         second = ServerProcess(rig_file.parent, rig_file)
         servers.callback(second.http.close)
         servers.callback(second.kill)
