@@ -13,14 +13,15 @@ comes to rest.
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
 from processing.analysis.droplets.shadows.discs.disc_optics import first_disc_optics
 from processing.analysis.droplets.shadows.discs.opaque_discs import Discs
-from processing.analysis.droplets.shadows.light.light_search import Light, stated_ratio
-from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS, SeenLight, told_otherwise
+from processing.analysis.droplets.shadows.light.light_search import Light, larger_than_stated, seen_light, stated_ratio
+from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS, SeenLight, looks_otherwise
 from processing.analysis.droplets.shadows.shadow_candidates import Stage
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from processing.analysis.droplets.shadows.shadow_rounds import ShadowRounds
@@ -92,15 +93,16 @@ def light_contradicted(
     if len(fit.discs) < FEWEST_AGAINST or (light == "estimated" and len(fit.discs) >= LEAST_DROPLETS):
         return ()
     finder = ShadowRounds(shot, search, before_round)
-    seen, stated = finder.light(fit, FEWEST_AGAINST), fit.optics.condenser_ratio
+    in_light, stated = cache(lambda ratio: finder.in_light(fit, ratio)), fit.optics.condenser_ratio
+    seen = seen_light(in_light, resolved=finder.resolves_light(fit), fewest=FEWEST_AGAINST)
     if seen.doubts(max(len(fit.discs), LEAST_DROPLETS)):
         return ()
-    larger = finder.larger_than_stated(fit, seen.condenser_ratio)
+    larger = larger_than_stated(in_light, stated, seen.condenser_ratio)
     known_voxel = np.hypot(COHERENT_SHARE * np.median(fit.discs.radii_voxel), fit.light.radius_sd)
     if abs(larger) <= CONTRADICTED * known_voxel:
         return ()
     off_um = 2000 * larger * search.searched.pitch_mm
-    return (told_otherwise(stated, seen.condenser_ratio, off_um, by_others=light == "estimated"),)
+    return (looks_otherwise(stated, seen.condenser_ratio, off_um, by_others=light == "estimated"),)
 
 
 def behind_gaussian_blur(shot: Transmissions, search: DropletSearch, fit: ShadowFit) -> FloatArray:

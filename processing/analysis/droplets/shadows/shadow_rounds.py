@@ -22,8 +22,8 @@ from processing.analysis.droplets.shadows.discs.opaque_discs import (
 )
 from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views
 from processing.analysis.droplets.shadows.light.fringes import fringes_of
-from processing.analysis.droplets.shadows.light.light_search import LEAST_BLUR_PX, Relit, larger_than_stated, seen_light
-from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS, SeenLight
+from processing.analysis.droplets.shadows.light.light_search import LEAST_BLUR_PX, Relit, seen_light
+from processing.analysis.droplets.shadows.light.seen_light import SeenLight
 from processing.analysis.droplets.shadows.masked_liquid import liquid_masks, liquid_objects
 from processing.analysis.droplets.shadows.relit_discs import relit
 from processing.analysis.droplets.shadows.shadow_candidates import Stage, shadow_peaks
@@ -92,13 +92,9 @@ class ShadowRounds:
             left, before = self._left(fit), left
         return fit
 
-    def light(self, fit: ShadowFit, fewest: int = LEAST_DROPLETS) -> SeenLight:
-        """What the droplets, if no fewer, say of the light."""
-        return seen_light(lambda ratio: self.in_light(fit, ratio), resolved=self.resolves_light(fit), fewest=fewest)
-
-    def larger_than_stated(self, fit: ShadowFit, seen: float | None) -> float:
-        """How much larger radii are, in voxels, in the light that droplets tell than in that of the fit."""
-        return larger_than_stated(lambda ratio: self.in_light(fit, ratio), fit.optics.condenser_ratio, seen)
+    def light(self, fit: ShadowFit) -> SeenLight:
+        """What the droplets say of the light."""
+        return seen_light(lambda ratio: self.in_light(fit, ratio), resolved=self.resolves_light(fit))
 
     def in_light(self, fit: ShadowFit, condenser_ratio: float | None) -> Relit:
         """The droplets in some light, what it leaves around each, and how much of its fringes is there."""

@@ -86,7 +86,7 @@ def without_fringes(fringes: Fringes, wrong: str) -> str:
     )
 
 
-def told_otherwise(stated: float | None, seen: float | None, off_um: float, *, by_others: bool) -> str:
+def looks_otherwise(stated: float | None, seen: float | None, off_um: float, *, by_others: bool) -> str:
     """Why a light is doubted that was stated, or told by other shots: droplets tell another, with other diameters."""
     names = [
         "behind a Gaussian blur" if ratio is None else f"in light of {ratio:g} apertures" for ratio in (stated, seen)
