@@ -184,8 +184,8 @@ def rms_of(values: FloatArray) -> float:
 def _first_scale(images: Sequence[Image], optics: BlobOptics) -> float:
     """Median amplitude of what stands out of the noise in the images, before anything is fitted."""
     tops = []
-    for image, gain, offset in zip(images, optics.gains, optics.offsets, strict=True):
-        lit = image - np.float32(offset)
+    for image, gain, level in zip(images, optics.gains, optics.levels, strict=True):
+        lit = image - level
         tops.append(lit[(lit == maximum_filter(lit, 3)) & (lit > 6)] / gain)
     heights = np.concatenate(tops)
     return _typical(heights) if len(heights) else 1.0

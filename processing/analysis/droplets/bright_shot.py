@@ -140,10 +140,8 @@ def _is_seen(shot: BlobImages, search: DropletSearch, positions_voxel: FloatArra
 
 
 def _seen(optics: BlobOptics, noises: FloatArray, left: FloatArray, names: Sequence[str]) -> dict[str, SeenView]:
-    gains = optics.gains * noises
-    rows = np.column_stack(
-        [noises * left, optics.offsets * noises, gains / gains.mean(), optics.sigmas_px, optics.shifts_px]
-    )
+    gains, levels = optics.gains * noises, np.array([np.median(level) for level in optics.levels])
+    rows = np.column_stack([noises * left, levels * noises, gains / gains.mean(), optics.sigmas_px, optics.shifts_px])
     return {name: SeenView(*row) for name, row in zip(names, rows.tolist(), strict=True)}
 
 
@@ -199,8 +197,8 @@ def _twin_ghosts(
     """Ghosts of a twin: the droplets moved, drawn, made noisy, and found again."""
     truth = Blobs(moved(fit.blobs.positions_voxel, search, rng), fit.blobs.amplitudes)
     images = tuple(
-        (image + np.float32(offset) + rng.normal(0, noise, image.shape)).astype(np.float32)
-        for image, offset, noise in zip(shot.drawn(fit.optics, truth), fit.optics.offsets, left, strict=True)
+        (image + level + rng.normal(0, noise, image.shape)).astype(np.float32)
+        for image, level, noise in zip(shot.drawn(fit.optics, truth), fit.optics.levels, left, strict=True)
     )
     found = find_bright(replace(shot, images=images), search, before_round).blobs
     return ghosts_within(found.positions_voxel, truth.positions_voxel, search)

@@ -64,14 +64,14 @@ class BlobOptics:
         Widths along columns and rows.
     shifts_px : (K, 2) array
         How far the images lie beside the calibration, along columns and rows.
-    offsets : (K,) array
-        Level of an image without blobs.
+    levels : tuple of (rows, columns) float32 arrays
+        What images are without blobs: it varies slowly.
     """
 
     gains: FloatArray
     sigmas_px: FloatArray
     shifts_px: FloatArray
-    offsets: FloatArray
+    levels: tuple[Image, ...]
 
     @property
     def table(self) -> FloatArray:
@@ -103,14 +103,14 @@ class BlobImages:
     threads: int = 1
 
     def drawn(self, optics: BlobOptics, blobs: Blobs) -> list[Image]:
-        """What the views would see of blobs, without offset and noise."""
+        """What the views would see of blobs, without level and noise."""
         images = [np.zeros_like(image) for image in self.images]
         self._draw(images, optics, blobs, 1.0)
         return images
 
     def residuals(self, optics: BlobOptics, blobs: Blobs) -> list[Image]:
-        """What the images hold beyond blobs and offset."""
-        images = [image - np.float32(offset) for image, offset in zip(self.images, optics.offsets, strict=True)]
+        """What the images hold beyond blobs and level."""
+        images = [image - level for image, level in zip(self.images, optics.levels, strict=True)]
         self._draw(images, optics, blobs, -1.0)
         return images
 

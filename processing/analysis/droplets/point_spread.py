@@ -7,12 +7,20 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from processing.analysis.droplets.gaussian_blobs import BlobImages, BlobOptics, Blobs, Image
+from processing.analysis.smooth_level import smooth_level
 from processing.geometry import FloatArray
 from processing.kernels import _native
 
 LEAST_SIGMA_PX, MOST_SIGMA_PX = 0.4, (_native.MAX_BLOB_WINDOW_PX / 2 - 1) / _native.BLOB_REACH_SIGMAS
 ROUGH_PX = 41
 """What varies over more is no droplet."""
+DARKEST, DARKEST_SIGMAS = 0.01, 2.326
+"""Share of the pixels that are surely dark, and how far below its mean noise has as many."""
+LEAST_CELL_PX, CELL_WIDTHS = 25, 20
+"""The level is told by cells of so many pixels, or so many widths of a droplet, if these are more: it may follow glare,
+and must not follow droplets."""
+GUESSES = 3
+"""Glare looks like wide droplets until the level is known, and that depends on how wide droplets are."""
 STEP_PX = 0.01
 """Of numerical derivatives."""
 MOST_CHANGE = 0.1
@@ -23,11 +31,25 @@ def first_optics(images: Sequence[Image]) -> BlobOptics:
     """Gains and widths from the autocorrelation of images whose noise is 1.
 
     Randomly placed equal blobs have a Gaussian one, sqrt(2) as wide; lag 0 holds the noise as well and is left out.
-    The offset is where the darkest hundredth of the pixels would lie if they were noise.
+    The level is where the darkest hundredth of the pixels around would lie if they were noise.
     """
-    guesses = np.array([_guess(image) for image in images])
-    offsets = np.array([np.quantile(image, 0.01) + 2.326 for image in images])
-    return BlobOptics(guesses[:, 0] / guesses[:, 0].mean(), guesses[:, 1:], np.zeros((len(images), 2)), offsets)
+    levels, guesses = zip(*map(_first_guess, images), strict=True)
+    gains, *widths_px = np.array(guesses).T
+    return BlobOptics(gains / gains.mean(), np.column_stack(widths_px), np.zeros((len(images), 2)), levels)
+
+
+def _first_guess(image: Image) -> tuple[Image, tuple[float, float, float]]:
+    """Level, and gain and widths."""
+    cell_px = LEAST_CELL_PX
+    for _ in range(GUESSES):
+        level = smooth_level(image, cell_px, DARKEST) + np.float32(DARKEST_SIGMAS)
+        guess = _guess(image - level)
+        cell_px = _cell_px(guess[1:])
+    return level, guess
+
+
+def _cell_px(widths_px: Sequence[float]) -> int:
+    return max(LEAST_CELL_PX, round(CELL_WIDTHS * max(widths_px)))
 
 
 def _guess(image: Image) -> tuple[float, float, float]:
@@ -47,10 +69,10 @@ def _width(correlation: FloatArray) -> float:
 
 
 def refined_optics(shot: BlobImages, optics: BlobOptics, blobs: Blobs, *, shifts: bool) -> BlobOptics:
-    """One Gauss-Newton step of gains, widths and shifts of all views, all blobs fixed; then the offsets.
+    """One Gauss-Newton step of gains, widths and shifts of all views, all blobs fixed; then the levels.
 
     What the shifts of all views have in common with a motion of the volume is taken out: the calibration says better
-    where the volume is. The offset is the median of what is left.
+    where the volume is. A level is the median of what is left around.
     """
     residuals = shot.residuals(optics, blobs)
     steps = _steps(shot, optics, blobs, residuals, shifts)
@@ -61,7 +83,10 @@ def refined_optics(shot: BlobImages, optics: BlobOptics, blobs: Blobs, *, shifts
         gains / gains.mean(),
         np.clip(widths, LEAST_SIGMA_PX, MOST_SIGMA_PX),
         without_motion(moved, shot.lattice.motion_px),
-        optics.offsets + np.array([np.median(residual) for residual in residuals]),
+        tuple(
+            level + smooth_level(residual, _cell_px(widths_px))
+            for level, residual, widths_px in zip(optics.levels, residuals, optics.sigmas_px.tolist(), strict=True)
+        ),
     )
 
 

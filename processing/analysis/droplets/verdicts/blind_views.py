@@ -7,10 +7,13 @@ import numpy as np
 from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.analysis.smooth_level import smooth_level
 from processing.geometry import FloatArray
 
 LIT_SIGMAS, LIT_PIXELS = 6.0, 4
-"""A view that has fewer pixels above so many standard deviations of its noise sees nothing."""
+"""A view that has fewer pixels so many standard deviations of its noise above the level around sees nothing."""
+SMOOTH_PX = 41
+"""What varies over more is light, and no droplet."""
 
 
 def check_images(images: Sequence[Image], search: DropletSearch) -> None:
@@ -36,7 +39,7 @@ def blind_views(bright: Sequence[Image], noises: FloatArray, names: Sequence[str
     return tuple(
         name
         for name, image, noise in zip(names, bright, noises, strict=True)
-        if np.count_nonzero(image > np.median(image) + LIT_SIGMAS * noise) < LIT_PIXELS
+        if np.count_nonzero(image - smooth_level(image, SMOOTH_PX) > LIT_SIGMAS * noise) < LIT_PIXELS
     )
 
 

@@ -15,6 +15,7 @@ from processing.analysis.droplets.verdicts.explained_images import RatioLimits, 
 from processing.analysis.droplets.verdicts.twins import judged_by_twins
 from processing.analysis.estimates import Estimate
 from processing.analysis.hidden import Hidden
+from processing.geometry import FloatArray
 from processing.reconstruction.errors import ReconstructionError
 from processing.studies.droplets import BrightScene, DropletCase
 from processing.volume import VoxelGrid
@@ -162,6 +163,49 @@ def test_images_without_droplets_are_empty(truth: BrightScene, level: float) -> 
     assert (shot.verdict, len(shot.droplets), shot.reasons) == (ShotVerdict.EMPTY, 0, ("no view sees a droplet",))
     dark = measure_bright([np.full_like(image, level) for image in truth.images], search_of(truth))
     assert dark.verdict is ShotVerdict.EMPTY
+
+
+def lit(image: Image, glow: Callable[[FloatArray, FloatArray], FloatArray]) -> Image:
+    """With scattered light, of places from -1 to 1 along columns and rows."""
+    rows, columns = (np.linspace(-1, 1, size_px) for size_px in image.shape)
+    return np.asarray(image + glow(columns[None], rows[:, None]), np.float32)
+
+
+def hill(along: FloatArray, down: FloatArray) -> FloatArray:
+    """120 pixels wide, 7 times the noise high."""
+    return 0.2 * np.exp(-(along**2) / 0.36 - (down**2) / 2)
+
+
+def weak_spot(along: FloatArray, down: FloatArray) -> FloatArray:
+    return 0.1 * np.exp(-((along - 0.3) ** 2) / 0.1 - (down**2) / 0.5)
+
+
+def ramp(along: FloatArray, down: FloatArray) -> FloatArray:
+    return 1.5 * along + 0.5 * down
+
+
+@pytest.mark.parametrize("glow", [hill, weak_spot, ramp])
+@pytest.mark.parametrize("views", [(0, 1, 2, 3), (2,)])
+def test_a_smooth_glow_that_the_background_lacks_makes_no_ghosts(
+    truth: BrightScene, glow: Callable[[FloatArray, FloatArray], FloatArray], views: tuple[int, ...]
+) -> None:
+    images = [lit(image, glow) if view in views else image for view, image in enumerate(truth.images)]
+    told = measure_bright(images, search_of(truth))
+    found, ghosts = found_and_ghosts(told, truth)
+    assert ghosts <= 0.02
+    assert found >= 0.98
+    assert told.verdict is ShotVerdict.GOOD
+    match, _ = matches(told.droplets.points_mm, truth.points_mm, GRID.pitch_mm)
+    ratio = (told.droplets.amplitudes / truth.heights[match])[match >= 0]
+    assert np.median(ratio) == pytest.approx(1, abs=0.02)
+
+
+@pytest.mark.parametrize("views", [(0, 1, 2, 3), (2,)])
+def test_a_glow_without_droplets_is_empty(truth: BrightScene, views: tuple[int, ...]) -> None:
+    rng = np.random.default_rng(0)
+    noise = [rng.normal(0, 0.03, image.shape).astype(np.float32) for image in truth.images]
+    images = [lit(image, hill) if view in views else image for view, image in enumerate(noise)]
+    assert measure_bright(images, search_of(truth)).verdict is ShotVerdict.EMPTY
 
 
 def streaks(image: Image) -> Image:

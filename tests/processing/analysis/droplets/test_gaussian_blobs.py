@@ -1,6 +1,7 @@
 """The blob kernels against float64 numpy."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ OPTICS = BlobOptics(
     gains=np.array([1.0, 0.7, 1.2, 1.1]),
     sigmas_px=np.array([[1.0, 1.1], [0.8, 0.8], [1.5, 1.2], [2.5, 3.0]]),
     shifts_px=np.array([[0.1, 0], [0, -0.2], [0.05, 0.05], [0, 0]]),
-    offsets=np.zeros(4),
+    levels=(np.zeros(IMAGE_SIZE_PX[::-1], np.float32),) * 4,
 )
 
 
@@ -139,6 +140,6 @@ def test_peaks_are_those_of_numpy_with_one_of_equal_neighbours() -> None:
         ({"sigmas_px": np.zeros((4, 2))}, "must be positive"),
     ],
 )
-def test_kernels_refuse_optics_that_are_none(change: dict[str, FloatArray], complaint: str) -> None:
+def test_kernels_refuse_optics_that_are_none(change: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
         empty().drawn(replace(OPTICS, **change), blobs())
