@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from processing.exchanged_light import better_background
 from processing.imprint import imprint
 from processing.interlaced import ALTERNATING, rows_alternate
-from processing.preprocessing import Frame, Intensity, Polarity, is_dim
+from processing.preprocessing import Frame, Intensity, Polarity, is_dim, known_light
 
 DIM_LIGHT = "uses less than 1/8 of its grey values; is light missing, or are its bits too many?"
 FULL = 0.998
@@ -26,7 +27,15 @@ LEAST_LIGHT = 0.8
 BRIGHTEST = 0.02
 """So many pixels are somewhere."""
 SATURATED_SHARE = 0.01
-"""So many pixels of a background at full scale: more light than the camera can tell."""
+"""So many pixels of an image at full scale: more light than the camera can tell."""
+LEAST_FULL, PILED = 0.8, 2
+"""Many cameras are full below their full scale: at so much of it or above, the highest grey value has more than a
+hundredth of the pixels, and that many times those of the next one. Light has noise, and its highest value a few."""
+LEAST_KNOWN = 0.1
+"""Share of the pixels of a view of which something must be known."""
+MOST_SCATTERED, PATCH_PX = 0.05, 5
+"""Share of the pixels of which nothing is known while their neighbours are: of squares that wide some pixel is. With 4
+and 7 % of them droplets are found; with 10 % none is, and the view looked empty."""
 OPAQUE = 0.6
 """From so much missing light on a shadow is dense; of bright particles, so much of the height of the brightest."""
 FEW = 10
@@ -83,7 +92,11 @@ def odd_light(
         return wrong
     if (share := np.mean(background[coarse] > FULL * most)) > SATURATED_SHARE:
         return f"has a background of which {100 * share:.0f} % are saturated: shadows are too pale there"
-    return _unlike((light, _above_dark(background, dark) / most)) or _saturated(frame[coarse], most)
+    return (
+        _unlike((light, _above_dark(background, dark) / most))
+        or _unknown(background, dark, bits)
+        or _saturated(frame[coarse], most)
+    )
 
 
 def dim_light(frame: Frame, bits: int) -> str:
@@ -115,6 +128,29 @@ def odd_background(
     if better := better_background(frame, background, dark, others):
         return f"does not fit its background, but {better}: is that exchanged, or turned?"
     return ""
+
+
+def unknown_light(known: NDArray[np.bool_]) -> str:
+    """What a view says of whose pixels too few are known, or too many are unknown here and there; else empty.
+
+    Unknown pixels that lie together are dark corners, or what is ignored.
+
+    Parameters
+    ----------
+    known : (rows, columns) array
+        As of ``processing.preprocessing.known_light``.
+    """
+    if (share := float(np.mean(known))) < LEAST_KNOWN:
+        return f"has {100 * share:.0f} % of its pixels that are known: is its background saturated, or dark?"
+    unknown = ~known
+    patch = np.ones((PATCH_PX, PATCH_PX), np.uint8)
+    together = cv2.morphologyEx(unknown.astype(np.uint8), cv2.MORPH_OPEN, patch) > 0
+    if (scattered := float(np.mean(unknown & ~together))) <= MOST_SCATTERED:
+        return ""
+    return (
+        f"has {100 * scattered:.0f} % of its pixels, here and there, of which nothing is known, limit "
+        f"{100 * MOST_SCATTERED:.0f} %: is its background near saturation, or dark? No droplet is found among them"
+    )
 
 
 def light_share(frame: Frame, background: Intensity, *, bits: int, dark: Intensity | None = None) -> float:
@@ -202,12 +238,25 @@ def _lost(seen: NDArray[np.float32], kept: Intensity) -> str:
 
 
 def _saturated(frame: Frame, most: np.float32) -> str:
-    share = np.mean(frame > FULL * most)
-    return (
-        f"is saturated in {100 * share:.0f} % of its pixels: what there is is unknown"
-        if share > SATURATED_SHARE
-        else ""
-    )
+    if (share := _full_share(frame, most)) <= SATURATED_SHARE:
+        return ""
+    return f"is saturated in {100 * share:.0f} % of its pixels: what there is is unknown"
+
+
+def _full_share(frame: Frame, most: np.float32) -> float:
+    """Share of the pixels at full scale, or of those that pile up at the highest grey value below it."""
+    full, highest = float(np.mean(frame > FULL * most)), int(frame.max(initial=0))
+    if full > SATURATED_SHARE or highest < LEAST_FULL * most:
+        return full
+    piled, below = (np.count_nonzero(frame == value) for value in (highest, highest - 1))
+    return piled / frame.size if piled > PILED * below else full
+
+
+def _unknown(background: Intensity, dark: Intensity | None, bits: int) -> str:
+    """As ``unknown_light``; most backgrounds are known nearly everywhere, as a few pixels tell in no time."""
+    level, coarse = np.float32(0) if dark is None else dark, np.s_[::STRIDE_PX, ::STRIDE_PX]
+    known = known_light(background[coarse], level if dark is None else dark[coarse], bits=bits)
+    return unknown_light(known_light(background, level, bits=bits)) if np.mean(known) < 1 - MOST_SCATTERED else ""
 
 
 def _black_lines(frame: Frame) -> str:

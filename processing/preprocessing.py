@@ -131,14 +131,24 @@ def transmission(
         Inverse variance relative to a typical pixel, as of counted light; 0 where the background is
         dark or saturated, where the image is 1.
     """
-    full_scale = np.float32(2**bits - 1)
-    light = background - dark
-    known = (light >= LEAST_LIGHT * full_scale) & (background <= MOST_LIGHT * full_scale)
+    light, known = background - dark, known_light(background, dark, bits=bits)
     sure = np.where(known, light, np.float32(0))
     if known.any():
         sure /= np.median(sure[known])
     image = np.where(known, (grey - dark) / np.where(known, light, np.float32(1)), np.float32(1))
     return image.astype(np.float32), sure.astype(np.float32)
+
+
+def known_light(background: Intensity, dark: Intensity | np.float32, *, bits: int) -> NDArray[np.bool_]:
+    """Of which pixels a background tells the light, (rows, columns): it is neither dark there nor saturated.
+
+    Parameters
+    ----------
+    background, dark, bits
+        As of ``transmission``.
+    """
+    full_scale = np.float32(2**bits - 1)
+    return (background - dark >= LEAST_LIGHT * full_scale) & (background <= MOST_LIGHT * full_scale)
 
 
 def is_dim(frame: Frame, bits: int) -> bool:

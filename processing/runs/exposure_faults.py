@@ -1,7 +1,7 @@
 """What is wrong with the images of an exposure, so that its volume may look fine and be none: told with the volume."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -80,11 +80,28 @@ def fault_lines(faults: Mapping[str, Any]) -> list[str]:
 def odd_lights(
     seen: Mapping[str, SeenView], polarity: Polarity, images: Sequence[Intensity] | None = None
 ) -> dict[str, str]:
-    """What is odd with the light of an exposure, by view; see ``odd_light``, and with its images ``hollowed``."""
+    """What is odd with the light of an exposure, by view; see ``odd_light``, and with its images ``hollowed``.
+
+    And which views lack a reference that others have: it was removed.
+    """
     said = {}
     for number, (view, one) in enumerate(seen.items()):
         bits, dark, background, others = one.bits, one.dark, one.background, other_backgrounds(seen, view)
-        said[view] = odd_light(one.grey, polarity, bits=bits, dark=dark, background=background, others=others)
+        said[view] = _lacking(one, seen.values()) or odd_light(
+            one.grey, polarity, bits=bits, dark=dark, background=background, others=others
+        )
         if images is not None and not said[view]:
             said[view] = hollowed(one.grey, images[number], polarity, bits=bits, dark=dark, background=background)
     return {view: what for view, what in said.items() if what}
+
+
+def _lacking(one: SeenView, seen: Collection[SeenView]) -> str:
+    """Which references a view lacks that others have."""
+    lacks = {
+        "dark image": one.dark is None and any(other.dark is not None for other in seen),
+        "background": one.background is None and any(other.background is not None for other in seen),
+    }
+    if not any(lacks.values()):
+        return ""
+    names = " and no ".join(name for name, is_lacking in lacks.items() if is_lacking)
+    return f"has no {names}, and other views have: was that removed? Its shadows are not as pale or dark as theirs"

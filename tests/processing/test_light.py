@@ -133,6 +133,38 @@ def test_light_that_the_camera_cannot_tell_is_odd() -> None:
     assert told(1.6 * SHOT, 1.6 * LIGHT, dark=0 * LIGHT + 8).startswith("has a background of which")
 
 
+def lit(level: float, seed: int, frames: int = 1, full: float = 1.0, fall: float = 0.0) -> NDArray[np.float64]:
+    """Grey values of 12 bits of even light with 1 % of noise, by a camera that is full at a share of its full scale."""
+    rng = np.random.default_rng(seed)
+    light = level * (1 - fall * COLUMNS / COLUMNS.max())
+    seen = [np.minimum(light + rng.normal(0, 0.01, light.shape), full) for _ in range(frames)]
+    return np.asarray(np.mean(np.rint(4095 * np.clip(seen, 0, 1)), axis=0))
+
+
+def told_lit(level: float, seed: int, full: float = 1.0, fall: float = 0.0) -> str:
+    shot = lit(level, seed, full=full, fall=fall) * (1 - droplets(seed))
+    background = lit(level, seed + 100, frames=8, full=full, fall=fall).astype(np.float32)
+    return odd_light(np.rint(shot).astype(np.uint16), "shadow", bits=12, background=background)
+
+
+@pytest.mark.parametrize("full", [0.85, 0.97, 0.995])
+@pytest.mark.parametrize("level", [1.05, 1.3])
+def test_a_camera_that_is_full_below_its_full_scale_is_told(level: float, full: float) -> None:
+    """Its shadows are too pale: voxels by four views have 0.04 to 0.7 of their values."""
+    assert "saturated" in told_lit(level, 1, full=full)
+
+
+def test_a_background_near_saturation_is_told() -> None:
+    """Mean of noise that is cut at full scale: of many pixels here and there nothing is known."""
+    assert "of its pixels, here and there, of which nothing is known" in told_lit(0.978, 1)
+
+
+@pytest.mark.parametrize("fall", [0.0, 0.3])
+@pytest.mark.parametrize("level", [0.3, 0.8, 0.94])
+def test_bright_light_that_the_camera_can_tell_is_fine(level: float, fall: float) -> None:
+    assert [told for seed in range(10) if (told := told_lit(level, seed, fall=fall))] == []
+
+
 def test_bright_particles_on_black_are_fine() -> None:
     assert told(5 + 200 * droplets(1), None, "bright") == ""
     assert told(5 + 0 * LIGHT, None, "bright") == ""

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 
 from processing.analysis.droplets.droplet_search import DropletSearch
@@ -17,6 +16,7 @@ from processing.analysis.droplets.shadows.masked_liquid import UNEXPLAINED
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise
 from processing.analysis.droplets.verdicts.explained_images import RatioLimits, judged
 from processing.geometry import FloatArray
+from processing.light import unknown_light
 
 LIMITS = RatioLimits(trusted=1.25, refused=2.0)
 """Of discs: overlapping shadows leave something even where all droplets are right. Simulated shots of 28 to 40 droplets
@@ -38,11 +38,6 @@ to 10 %, 19 to 75 % where droplets move by two pixels or more while light is on,
 UNLIKE_BLURS = 1.4
 """Blur of the widest view over that of the sharpest, in light that shows: diffraction by like lenses is as wide in all.
 Two of four lenses out of focus, at 1.5 and 1.8, made diameters 7 and 9 um too large, and the light another one."""
-LEAST_KNOWN = 0.1
-"""Share of the pixels of a view of which something must be known."""
-MOST_SCATTERED, PATCH_PX = 0.05, 5
-"""Share of the pixels of which nothing is known while their neighbours are: of squares that wide some pixel is. With 4
-and 7 % of them droplets are found; with 10 % none is, and the view looked empty."""
 
 
 def unlit(images: Sequence[Image], trusts: Sequence[Image], names: Sequence[str]) -> tuple[str, ...]:
@@ -52,28 +47,15 @@ def unlit(images: Sequence[Image], trusts: Sequence[Image], names: Sequence[str]
 
 
 def _without_light(name: str, image: Image, trust: Image) -> str:
-    known = image[trust > 0]
-    if known.size < LEAST_KNOWN * image.size:
-        return f"{name}: {known.size / image.size:.0%} of its pixels are known: is its background saturated, or dark?"
-    if (scattered := _scattered(trust)) > MOST_SCATTERED:
-        return (
-            f"{name}: nothing is known of {scattered:.0%} of its pixels, here and there, limit {MOST_SCATTERED:.0%}: "
-            "is its background near saturation, or dark? No droplet is found among them"
-        )
-    light = float(np.percentile(known, FREE_PERCENTILE))
+    if unknown := unknown_light(trust > 0):
+        return f"{name} {unknown}"
+    light = float(np.percentile(image[trust > 0], FREE_PERCENTILE))
     if LIGHTS[0] <= light <= LIGHTS[1]:
         return ""
     return (
         f"{name}: its light is {light:.2g} of its background's, limits {LIGHTS[0]:g} and {LIGHTS[1]:g}: is a lens "
         "covered, a light off, or was the background taken with another light?"
     )
-
-
-def _scattered(trust: Image) -> float:
-    """Share of the pixels of which nothing is known, but for those that lie together: dark corners, what is ignored."""
-    unknown = trust <= 0
-    together = cv2.morphologyEx(unknown.astype(np.uint8), cv2.MORPH_OPEN, np.ones((PATCH_PX, PATCH_PX), np.uint8)) > 0
-    return float(np.mean(unknown & ~together))
 
 
 def judged_by_light(

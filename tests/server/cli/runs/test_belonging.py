@@ -41,6 +41,7 @@ def test_a_view_that_has_moved_does_not_pass_in_silence(
     assert (tmp_path / out).exists(), "nothing that was computed is thrown away"
     assert answer["passed"] is False
     assert answer["belonging"]["verdict"] == "refuse"
+    assert "whether grey values are in proportion to light" in answer["belonging"]["not_checked"][0]["what"]
     assert [(shot["shot"], shot["moved"]) for shot in answer["belonging"]["shots"]] == [(0, "view2"), (1, "view2")]
     files = sorted(tmp_path.rglob("*.vtkhdf"))
     for _, _, provenance in map(read_volume, files):

@@ -92,7 +92,7 @@ def test_a_background_near_saturation_is_no_empty_view(scene: ShadowScene, scatt
     trust = [np.where(unknown, 0, 1).astype(np.float32), *(np.ones_like(image) for image in scene.images[1:])]
     told = measure_shadows(scene.images, search_of(scene, MARGIN_VOXEL), trust=trust)
     said = "; ".join(told.reasons)
-    assert ("nothing is known of 25 % of its pixels, here and there" in said.replace("25%", "25 %")) == scattered, said
+    assert ("has 25 % of its pixels, here and there, of which nothing is known" in said) == scattered, said
     assert (told.verdict is ShotVerdict.REFUSED) == scattered
 
 
@@ -271,7 +271,7 @@ def test_views_of_which_nothing_is_known_are_refused_and_not_empty(scene: Shadow
     trust[2][:] = 0
     shot = measure_shadows(scene.images, search_of(scene, MARGIN_VOXEL), trust=trust)
     assert (shot.verdict, len(shot.droplets)) == (ShotVerdict.REFUSED, 0)
-    assert "view 3: 0% of its pixels are known" in shot.reasons[0]
+    assert "view 3 has 0 % of its pixels that are known" in shot.reasons[0]
 
 
 def test_bad_images_are_named(scene: ShadowScene) -> None:
