@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.files.atomic_file import replacing
-from processing.analysis.exports.shot_table import Stored, shot_table
+from processing.analysis.exports.shot_table import shot_table
+from processing.analysis.exports.stored import Stored
 
 
 def write_csv(path: Path, stored: Stored) -> None:

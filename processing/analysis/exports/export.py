@@ -8,7 +8,7 @@ from types import MappingProxyType
 from processing.analysis.droplets.droplet_file import read_droplets
 from processing.analysis.exports.csv_file import write_csv
 from processing.analysis.exports.parquet_file import require_pyarrow, write_parquet
-from processing.analysis.exports.shot_table import Stored
+from processing.analysis.exports.stored import Stored
 from processing.analysis.exports.tecplot_file import write_tecplot
 from processing.analysis.exports.vtk_file import write_vtk
 from processing.analysis.velocity.track_file import read_tracks

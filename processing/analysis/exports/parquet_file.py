@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from daq.files.atomic_file import replacing
-from processing.analysis.exports.shot_table import Stored, shot_table
+from processing.analysis.exports.shot_table import shot_table
+from processing.analysis.exports.stored import Stored
+from processing.analysis.exports.told_verdict import told_texts
 from processing.errors import BadInput
 
 PROVENANCE = "tomoshadow"
@@ -41,7 +43,7 @@ def write_parquet(path: Path, stored: Stored) -> None:
     path : Path
         Usually ``*.parquet``; an existing file is replaced.
     stored : Stored
-        Droplets of a shot, or tracks; their provenance becomes metadata of the table.
+        Droplets of a shot, or tracks; their provenance becomes metadata of the table, and what they are good for.
 
     Raises
     ------
@@ -52,6 +54,6 @@ def write_parquet(path: Path, stored: Stored) -> None:
     table = pyarrow.table(
         {name: pyarrow.array(column, from_pandas=True) for name, column in shot_table(stored).items()}
     )
-    metadata = {PROVENANCE: json.dumps(stored.provenance)}
+    metadata = {PROVENANCE: json.dumps(stored.provenance), **told_texts(stored)}
     with replacing(path) as part:
         parquet.write_table(table.replace_schema_metadata(metadata), part)

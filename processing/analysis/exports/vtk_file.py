@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from daq.files.atomic_file import replacing
 from processing.analysis.droplets.droplet_file import FRAME, PROVENANCE, DropletFileError
-from processing.analysis.exports.shot_table import TRACK, Stored
+from processing.analysis.exports.shot_table import TRACK
+from processing.analysis.exports.stored import Stored
+from processing.analysis.exports.told_verdict import DOUBTFUL, doubtful, told_texts
 
 FORMAT_VERSION = (2, 0)
 CELLS = ("Vertices", "Lines", "Polygons", "Strips")
@@ -36,7 +38,7 @@ def write_vtk(path: Path, stored: Stored) -> None:
         raise DropletFileError(f"{path}: droplets without {', '.join(missing)} have no place in space; export csv")
     with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as file:
         _write_poly_data(file.create_group("VTKHDF", track_order=True), stored)
-        file.create_group(PROVENANCE).attrs.update(stored.provenance)
+        file.create_group(PROVENANCE).attrs.update({**told_texts(stored), **stored.provenance})
 
 
 def _write_poly_data(group: h5py.Group, stored: Stored) -> None:
@@ -49,6 +51,7 @@ def _write_poly_data(group: h5py.Group, stored: Stored) -> None:
     for cells in CELLS:
         _write_cells(group.create_group(cells), offsets if cells == filled else np.zeros(1, np.int64))
     arrays = group.create_group("PointData", track_order=True)
+    arrays[DOUBTFUL] = doubtful(stored)
     for name, column in stored.columns.items():
         if name == FRAME:
             arrays[EXPOSURE] = (column == "b").astype(np.int8)

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkObject
+from vtkmodules.vtkIOGeometry import vtkTecplotReader
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_columns, write_droplets
@@ -34,11 +36,16 @@ def droplets(n: int, seed: int) -> Droplets:
     )  # fmt: skip
 
 
+DOUBT = 'droplets explain "1.3" times the noise, limit 1.25: ZONE by zone?'
+EXPOSURES = {"a": {"verdict": "good", "reasons": []}, "b": {"verdict": "doubtful", "reasons": [DOUBT]}}
+
+
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     """Five droplets in exposure A, three in B."""
     path = tmp_path / "shot_00007_droplets.h5"
-    write_droplets(path, {"a": droplets(5, 1), "b": droplets(3, 2)}, {"run": "spray", "shot": 7})
+    told = {"run": "spray", "shot": 7, "exposures": json.dumps(EXPOSURES)}
+    write_droplets(path, {"a": droplets(5, 1), "b": droplets(3, 2)}, told)
     return path
 
 
@@ -90,7 +97,8 @@ def test_csv_has_every_digit_and_no_nan(file: Path) -> None:
     with path.open(newline="") as text:
         rows = list(csv.DictReader(text))
     stored = read_droplets(file).columns
-    assert list(rows[0]) == ["shot", *stored]
+    assert list(rows[0]) == ["shot", *stored, "verdict", "doubts"]
+    assert [(row["verdict"], row["doubts"]) for row in rows] == [("good", "")] * 5 + [("doubtful", DOUBT)] * 3
     assert {row["shot"] for row in rows} == {"7"}
     assert {row["p_real"] for row in rows} == {""}
     assert [row["frame"] for row in rows] == list("aaaaabbb")
@@ -102,7 +110,9 @@ def test_csv_has_every_digit_and_no_nan(file: Path) -> None:
 def test_parquet_keeps_columns_types_and_provenance(file: Path) -> None:
     table = parquet.read_table(export_droplets(file, "parquet"))
     stored = read_droplets(file)
-    assert table.column_names == ["shot", *stored.columns]
+    assert table.column_names == ["shot", *stored.columns, "verdict", "doubts"]
+    assert table["verdict"].to_pylist() == ["good"] * 5 + ["doubtful"] * 3
+    assert (table.schema.metadata[b"verdict"], table.schema.metadata[b"doubts"]) == (b"doubtful", DOUBT.encode())
     for name, column in without_p_real(stored.columns).items():
         assert table[name].to_pylist() == column.tolist(), name
     assert [str(table.schema.field(name).type) for name in ("shot", "frame", "x_mm", "views")] == [
@@ -130,6 +140,7 @@ def test_vtk_reads_points_and_arrays(file: Path) -> None:
     for name in ("amplitude", "residual", "cov_xz_mm2"):
         np.testing.assert_array_equal(vtk_to_numpy(arrays.GetArray(name)), stored[name])
     assert vtk_to_numpy(arrays.GetArray("exposure")).tolist() == [0] * 5 + [1] * 3
+    assert vtk_to_numpy(arrays.GetArray("doubtful")).tolist() == [0] * 5 + [1] * 3
 
 
 @pytest.mark.parametrize("n", [8, 0])
@@ -181,7 +192,7 @@ def test_tracks_are_a_row_per_droplet_in_csv_and_parquet(tracks: Path) -> None:
     stored = read_tracks(tracks).columns
     with export_tracks(tracks, "csv").open(newline="") as text:
         rows = list(csv.DictReader(text))
-    assert list(rows[0]) == list(stored)
+    assert list(rows[0]) == [*stored, "verdict", "doubts"]
     assert [float(row["u_m_s"]) for row in rows] == stored["u_m_s"].tolist()
     assert [row["p_link"] == "" for row in rows] == np.isnan(stored["p_link"]).tolist()
     table = parquet.read_table(export_tracks(tracks, "parquet"))
@@ -205,31 +216,73 @@ def test_tracks_are_lines_in_vtkhdf(tracks: Path) -> None:
 def test_tecplot_has_a_zone_per_exposure_and_no_number_that_is_none(file: Path) -> None:
     path, stored = export_droplets(file, "tecplot"), read_droplets(file).columns
     assert path.name == "shot_00007_droplets.dat"
-    title, names, zones = tecplot_zones(path)
+    title, names, zones, told = tecplot_zones(path)
     assert title == "spray, 7"
+    assert told == {"verdict": "doubtful", "doubts": DOUBT.replace('"', "'")}
     assert names[:3] == ["x_mm", "y_mm", "z_mm"]
-    assert set(names) == {"shot", *stored} - {"frame"}
-    assert [(zone.title, zone.time, len(zone.rows)) for zone in zones] == [("exposure a", 7, 5), ("exposure b", 7, 3)]
+    assert set(names) == {"shot", "doubtful", *stored} - {"frame"}
+    assert [(zone.title, zone.time, len(zone.rows)) for zone in zones] == [
+        ("exposure a, without p_real", 7, 5), ("exposure b, without p_real", 7, 3)
+    ]  # fmt: skip
+    assert [zone.told["verdict"] for zone in zones] == ["good", "doubtful"]
     assert zones[0].strand != zones[1].strand
     read = np.vstack([zone.rows for zone in zones])
+    ours = {**stored, "shot": np.full(8, 7), "doubtful": np.repeat([0, 1], [5, 3]), "p_real": np.full(8, -999.0)}
     for number, name in enumerate(names):
-        np.testing.assert_array_equal(read[:, number], np.full(8, 7) if name == "shot" else stored[name])
+        np.testing.assert_array_equal(read[:, number], ours[name])
+
+
+def test_a_reader_of_others_has_all_zones_of_tecplot(file: Path, tracks: Path) -> None:
+    """That of VTK, by which ParaView opens them: its numbers have single precision."""
+    vtkObject.GlobalWarningDisplayOff()
+    for path in (export_droplets(file, "tecplot"), export_tracks(tracks, "tecplot")):
+        reader = vtkTecplotReader()
+        reader.SetFileName(str(path))
+        reader.Update()
+        _, names, zones, _ = tecplot_zones(path)
+        blocks = [reader.GetOutput().GetBlock(number) for number in range(reader.GetOutput().GetNumberOfBlocks())]
+        assert [block.GetNumberOfPoints() for block in blocks] == [len(zone.rows) for zone in zones]
+        for block, zone in zip(blocks, zones, strict=True):
+            seen = [vtk_to_numpy(block.GetPoints().GetData())]
+            seen += [vtk_to_numpy(block.GetPointData().GetArray(name))[:, None] for name in names[3:]]
+            np.testing.assert_array_equal(np.hstack(seen), zone.rows.astype(np.float32))
 
 
 def test_tecplot_has_a_zone_per_shot_of_tracks_and_its_time(tracks: Path) -> None:
-    title, names, zones = tecplot_zones(export_tracks(tracks, "tecplot"))
+    title, names, zones, told = tecplot_zones(export_tracks(tracks, "tecplot"))
     stored = read_tracks(tracks).columns
-    assert title == "a 'spray'"
+    assert (title, told) == ("a 'spray'", {"verdict": "good"})
     assert [(zone.title, zone.time) for zone in zones] == [
-        ("shot 3", 0.0015), ("shot 4", 0.002), ("shot 5", 0.0025), ("shot 6", 0.003)
+        ("shot 3, without p_link", 0.0015), ("shot 4", 0.002), ("shot 5", 0.0025), ("shot 6", 0.003)
     ]  # fmt: skip
     assert len({(zone.strand, zone.time) for zone in zones}) == len(zones)
     read = np.vstack([zone.rows for zone in zones])
     order = np.lexsort([stored["track"], stored["shot"]])
+    ours = {**stored, "doubtful": np.zeros(7)}
     for number, name in enumerate(names):
-        np.testing.assert_array_equal(read[:, number], stored[name][order])
+        np.testing.assert_array_equal(read[:, number], np.nan_to_num(ours[name], nan=-999.0)[order])
+
+
+def test_velocities_that_are_less_good_than_places_are_told_beside_them(tmp_path: Path) -> None:
+    path, velocity = tmp_path / "shot_00001_droplets.h5", {"verdict": "refused", "reasons": ["rows are even"]}
+    told = {"exposures": json.dumps({"a": EXPOSURES["a"]}), "velocity": json.dumps(velocity)}
+    write_droplets(path, {"a": droplets(2, 1)}, told, velocities={"a": {"u_m_s": np.full(2, np.nan)}})
+    with export_droplets(path, "csv").open(newline="") as text:
+        rows = list(csv.DictReader(text))
+    assert {(row["verdict"], row["velocity_verdict"], row["doubts"]) for row in rows} == {
+        ("good", "refused", "velocities: rows are even")
+    }
+    _, names, (zone,), _ = tecplot_zones(export_droplets(path, "tecplot"))
+    assert zone.rows[:, names.index("doubtful")].tolist() == [1, 1]
+
+
+def test_a_file_that_does_not_say_what_became_of_it_is_not_called_good(tmp_path: Path) -> None:
+    path = tmp_path / "old.h5"
+    write_droplets(path, {"a": droplets(2, 1)}, {"run": "spray"})
+    with export_droplets(path, "csv").open(newline="") as text:
+        assert {row["verdict"] for row in csv.DictReader(text)} == {"not told"}
 
 
 def test_a_shot_without_droplets_has_no_zones(empty: Path) -> None:
-    _, names, zones = tecplot_zones(export_droplets(empty, "tecplot"))
-    assert (names[0], zones) == ("x_mm", [])
+    _, names, zones, told = tecplot_zones(export_droplets(empty, "tecplot"))
+    assert (names[0], zones, told["verdict"]) == ("x_mm", [], "not told")
