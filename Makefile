@@ -1,7 +1,7 @@
 # Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-wheel test-debian13 wheel lint style serve firmware bench measured lock clean mutants flips fuzz fuzz-import soak
+.PHONY: help setup demo test test-fast test-wheel test-debian13 wheel lint style serve firmware bench measured lock clean mutants flips fuzz fuzz-import hunt soak
 
 # Containers forbid Python to keep what it compiled; then every process of the tests compiles all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
@@ -103,6 +103,12 @@ mutants: setup build/rp2040js/node_modules ## Shoot a long series and many plans
 
 fuzz-import: setup ## Damage manifests, tables and images in FUZZ_IMPORTS=2000 ways: each is imported or refused in a sentence.
 	@$(PYTHON) -m tests.support.fuzz_import $(FUZZ_IMPORTS) 2>/dev/null
+
+HUNT = $(if $(MINUTES),--minutes $(MINUTES)) $(if $(SEED),--seed $(SEED)) $(if $(CASES),--cases $(CASES)) \
+	$(if $(WORLD),--world "$(WORLD)") $(if $(DISTORTIONS),--distortions "$(DISTORTIONS)") $(if $(AMOUNT),--amount $(AMOUNT))
+hunt: export OPENBLAS_NUM_THREADS := 1
+hunt: setup ## Hunt for lies for MINUTES=10: known sprays, distorted by chance, are measured and judged; build/hunt.jsonl keeps each. SEED=7 CASES=1 is one of them again; WORLD=few, DISTORTIONS="veil+gamma" and AMOUNT=0.5 choose. TABLE=lights writes the table of lights in docs/measure.md anew.
+	@$(PYTHON) -m $(if $(TABLE),tests.hunt.$(TABLE),tests.hunt --json build/hunt.jsonl $(HUNT))
 
 soak: setup ## PART=kill: kill the server TIMES=100 times while it records, and count what is lost; goes on where it was interrupted. PART=faults: lose each device TIMES=10 times, and time the next run. PART=light: let everything go wrong in runs TIMES=20 times, and time how it becomes dark. PART=cluster: kill and cut off parts of a cluster TIMES=20 times. PART=workers: how busy two workers are with TIMES=16 shots. PART=long: record TIMES=10000 shots, count what is lost, and watch the memory.
 	@$(PRIVATE_NETWORK) $(PYTHON) -m tests.support.soak_$(or $(PART),kill) $(TIMES)
