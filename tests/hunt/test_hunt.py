@@ -177,14 +177,14 @@ def test_a_doubt_of_velocities_leaves_wrong_diameters_a_lie() -> None:
 
 
 def test_an_undistorted_world_is_measured_right() -> None:
-    case = drawn_case(3, "single", [])
+    case = case_of(replace(drawn("single", 3), stated_light="gaussian"), {}, np.random.default_rng(3))
     assert (case.outcome, case.distortions) == ("right", ())
     assert line(case).startswith("right")
 
 
 def test_a_wrong_separation_is_wrong_and_named_and_would_else_be_a_lie(tmp_path: Path) -> None:
     """The whole way: the run, both commands, their JSON, and the judge."""
-    world = replace(WORLD, stated_ns=2 * SEPARATION_NS)
+    world = replace(WORLD, stated_ns=2 * SEPARATION_NS, stated_light="gaussian")
     answer = asked(tmp_path, world, taken(world))
     assert judged(world, answer, [DISTORTIONS["separation wrong"].named]).outcome == "named"
     lie = judged(world, answer, [])
@@ -200,6 +200,15 @@ def test_the_table_counts_alarms_of_undistorted_worlds_and_lies_of_the_others() 
     lines = table(cases)
     assert lines[1].split() == ["gamma", "1"]
     assert lines[-1] == "2 cases: 1 lies, 0 named in not_checked, 0 right; 1 alarms in 1 undistorted worlds"
+
+
+def test_the_same_seed_is_the_same_case(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "tests.hunt.case.asked",
+        lambda _folder, world, seen: Answer(f"{world.noise} {seen.shots.sum()}", {}, {}, {}, ""),
+    )
+    one, other = (drawn_case(7, "single") for _ in range(2))
+    assert one == other != drawn_case(8, "single")
 
 
 def test_what_says_nothing_is_no_distortion(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,12 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import j1
 
-from tests.hunt.light import Bodies, behind_blur, by_waves, covered, spots
+from tests.hunt.light import ALL_ROUND, Bodies, behind_blur, by_waves, covered, spots
 from tests.hunt.rig import SIZE_PX, Array, Eye, eyes
 
 HALF_MM = np.array([1.7, 1.3, 1.2])
 """Half-widths of the box that is measured."""
 SEPARATION_NS = 6400
+STATED = 0.5
+"""Share of the shadows whose light is stated, and right."""
 DARK = 0.03
 """Of the camera, over its full scale."""
 Polarity = Literal["shadow", "bright"]
@@ -292,7 +294,7 @@ class Kind:
 
 
 KINDS = {
-    "few": Kind(least=5, most=8, shots=3),
+    "few": Kind(least=5, most=8, shots=3, exposures=1),
     "some": Kind(),
     "single": Kind(exposures=1),
     "many": Kind(least=120, most=200, exposures=1),
@@ -317,19 +319,28 @@ def drawn(kind: str, seed: int) -> World:
     views = eyes(how.views)
     narrow = rng.uniform(0.7, 0.95)
     blurs_px = tuple(narrow * (1.2 if abs(eye.azimuth_deg) > 30 else 1.0) for eye in views)
+    ratio = float(rng.choice(how.ratio)) if how.ratio else None
     return World(
         kind=kind,
         seed=seed,
         clouds=clouds,
         views=views,
         blurs_px=blurs_px,
-        ratio=float(rng.choice(how.ratio)) if how.ratio else None,
+        ratio=ratio,
         noise=float(rng.uniform(0.005, 0.018)) if how.polarity == "shadow" else float(rng.uniform(0.01, 0.05)),
         photons=float(rng.choice([0.0, 0.5, 0.9])),
         bits=int(rng.choice([8, 10, 12])),
         exposures=how.exposures,
         polarity=how.polarity,
+        stated_light=_light_in_words(ratio) if how.polarity == "shadow" and rng.random() < STATED else "",
     )
+
+
+def _light_in_words(ratio: float | None) -> str:
+    """As ``--light`` takes it."""
+    if ratio is None:
+        return "gaussian"
+    return "incoherent" if ratio >= ALL_ROUND else f"{ratio:g}"
 
 
 def _drawn_shot(how: Kind, rng: np.random.Generator, way_mm: Array) -> Cloud:
