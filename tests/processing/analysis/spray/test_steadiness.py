@@ -117,3 +117,13 @@ def test_shots_without_droplets_or_velocities_are_no_hindrance() -> None:
     assert "speed is 15" in told(one)
     still = SpraySample(one.diameters_um, one.points_mm, np.full_like(one.points_mm, np.nan), one.shot, one.volumes_mm3)
     assert "speed" not in told(still)
+
+
+def test_a_change_that_explains_all_is_told_without_a_warning() -> None:
+    """The first half of the shots is empty, all others have as many droplets: nothing scatters."""
+    every = sample(shots=12, gusts=0.01)
+    later = np.flatnonzero(every.shot >= 6)
+    rows = later[np.arange(len(later)) - np.searchsorted(every.shot[later], every.shot[later]) < 50]
+    names = ("diameters_um", "points_mm", "velocities_m_s", "shot")
+    kept = replace(every, volumes_mm3=np.full(12, 5.0), **{name: getattr(every, name)[rows] for name in names})
+    assert "droplets per mm3 are 0 in the first 6 shots, 10 in 6 later" in told(kept)
