@@ -44,7 +44,12 @@ def smallest_droplet_um(airy_px: float, scale_px_per_mm: float) -> float:
         Of the image.
     """
     blur_px = math.hypot(CORE_SIGMA * airy_px, PIXEL_SIGMA)
-    return 1000 * 2 * blur_px * math.sqrt(-2 * math.log(1 - LEAST_SHADOW)) / scale_px_per_mm
+    return 1000 * shadow_diameter_px(blur_px, LEAST_SHADOW) / scale_px_per_mm
+
+
+def shadow_diameter_px(blur_px: float, depth: float) -> float:
+    """Diameter of an opaque disc that takes a share ``depth`` of the light in its middle, behind a Gaussian blur."""
+    return 2 * blur_px * math.sqrt(-2 * math.log(1 - depth))
 
 
 def depth_of_field_mm(f_number: float, magnification: float, wavelength_um: float = GREEN_UM) -> float:

@@ -1,7 +1,7 @@
 """What shots say together of their images, which each of them by itself has too few droplets to say.
 
 Of shots with more droplets each has been asked by itself: whether they look like discs, whether those of B are as large
-as the very same ones of A. Whether all are a little longer than wide is asked of all shots.
+as the very same ones of A. Of all it is asked whether they are a little longer than wide, and how many are missing.
 """
 
 import json
@@ -15,6 +15,7 @@ from processing.analysis.droplets.droplet_file import DIAMETER, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import REFUSED
 from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS
 from processing.analysis.droplets.shadows.shadow_light import unlike_discs
+from processing.analysis.droplets.verdicts.cut_sizes import complete_from_um, cut_off
 from processing.analysis.droplets.verdicts.elongation import WRONG, Elongation, elongation_told
 from processing.analysis.unlike_sizes import FEWEST, LEAST_P_PAIR, LONGEST_NS, common_share, unlike_told
 from processing.geometry import FloatArray
@@ -28,7 +29,21 @@ def few_together(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
     sized = [shot for shot in shots if {DIAMETER, SD, RESIDUAL} <= shot.columns.keys()]
     told = (_shapes(sized), _sizes(sized))
     few = (f"shots with few droplets together: {what}" for what in told if what)
-    return (*few, *((f"all shots together: {length}{WRONG if is_wrong else ''}",) if length else ()))
+    of_all = (f"{length}{WRONG if is_wrong else ''}" if length else "", _smallest(sized))
+    return (*few, *(f"all shots together: {what}" for what in of_all if what))
+
+
+def _smallest(shots: Sequence[StoredDroplets]) -> str:
+    """Of exposures A: B shows the same droplets, and makes nothing surer."""
+    first = [np.asarray(shot.columns[DIAMETER], np.float64)[shot.columns["frame"] == "a"] for shot in shots]
+    limits_um = [np.full(len(its_um), _limit_um(shot)) for shot, its_um in zip(shots, first, strict=True)]
+    return cut_off(np.concatenate([np.empty(0), *first]), np.concatenate([np.empty(0), *limits_um]))
+
+
+def _limit_um(shot: StoredDroplets) -> float:
+    """From where on the droplets of its exposure A are found; 0 where its file does not tell."""
+    views = json.loads(str(shot.provenance.get("exposures", "{}"))).get("a", {}).get("views", {})
+    return complete_from_um([view.get("complete_from_um", 0.0) for view in views.values()])
 
 
 def _views(shots: Sequence[StoredDroplets]) -> list[Elongation]:

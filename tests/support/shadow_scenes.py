@@ -78,13 +78,14 @@ def shadow_scene(
     median_mm: float = 0.04,
     blurs_px: tuple[float, ...] = BLURS_PX,
     sharp: bool = False,
+    least_mm: float = 0.01,
 ) -> ShadowScene:
     """Droplets of lognormal size all over a grid, seen by the paper's views."""
     rng = np.random.default_rng(seed)
     grid, cameras = study_grid(shape), study_cameras(image_size_px)
     count = round(density_per_mm3 * grid.volume_mm3)
     points_mm = grid.to_mm(droplet_centres(shape, count, rng))
-    diameters_mm = np.clip(rng.lognormal(np.log(median_mm), 0.4, count), 0.01, 0.3)
+    diameters_mm = np.clip(rng.lognormal(np.log(median_mm), 0.4, count), least_mm, 0.3)
     images = []
     for camera, blur_px in zip(cameras, blurs_px, strict=True):
         radii_px = 0.5 * diameters_mm * scale_px_per_mm(camera, points_mm)

@@ -82,3 +82,15 @@ def test_nothing_is_told_of_good_shots_nor_of_many_droplets_nor_of_slow_ones_nor
     assert not few_together(shots(ratio=0.9, separation_ns=2e6))
     assert not few_together(shots(2, 2, ratio=0.9, unlike=0.8))
     assert not few_together([])
+
+
+@pytest.mark.parametrize(("complete_from_um", "told"), [(5.0, False), (12.0, True), (0.0, False)])
+def test_small_droplets_that_no_shot_alone_misses_are_told_of_all_shots(complete_from_um: float, told: bool) -> None:
+    """Two of five droplets of the spray are below 12 um."""
+    several, rng = shots(40), np.random.default_rng(3)
+    for shot in several:
+        views = {f"view{view}": {"complete_from_um": complete_from_um} for view in range(1, 5)}
+        shot.provenance["exposures"] = json.dumps({"a": {"views": views}})
+        spray_um = 13.0 * np.exp(0.4 * rng.standard_normal(100))
+        shot.columns["diameter_um"][:] = np.tile(spray_um[spray_um > 12.0][:4], 2)
+    assert ["all shots together: about" in what for what in few_together(several)] == [True] * told

@@ -35,6 +35,7 @@ from processing.analysis.droplets.shadows.shadow_table import sized_droplets
 from processing.analysis.droplets.shadows.shadow_union import union_defects
 from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.analysis.droplets.verdicts.blind_views import blind_verdict, check_images
+from processing.analysis.droplets.verdicts.cut_sizes import judged_by_smallest
 from processing.analysis.droplets.verdicts.elongation import judged_by_length
 from processing.analysis.droplets.verdicts.hidden_volume import judged_by_volume
 from processing.analysis.droplets.verdicts.twins import ghosts_within, judged_by_twins, moved
@@ -144,7 +145,8 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     told = droplets.where(lump < 0).within(search.grid)
     hidden = _hidden(shot, fit, search, known, lump)
     exposure = MeasuredExposure(told, views, ratio, verdict, reasons, hidden=hidden)
-    return judged_by_length(exposure, [view.elongation for view in views.values()])
+    exposure = judged_by_length(exposure, [view.elongation for view in views.values()])
+    return judged_by_smallest(exposure, [view.complete_from_um for view in views.values()])
 
 
 def _hidden(

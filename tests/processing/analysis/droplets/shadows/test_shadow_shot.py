@@ -302,6 +302,19 @@ def test_droplets_too_small_to_be_told_are_no_sparse_spray() -> None:
     assert ["of what views see beyond their noise" in reason for reason in told.reasons] == [True]
 
 
+@pytest.mark.parametrize(("median_mm", "cut"), [(0.0108, True), (0.032, False)])
+def test_a_spray_most_of_which_is_too_small_to_be_found_is_doubted(median_mm: float, cut: bool) -> None:
+    """What is found explains the images; its mean diameter was a third too large, and *good*."""
+    spray = shadow_scene(SHAPE, 24, IMAGE_SIZE_PX, seed=11, median_mm=median_mm, least_mm=0.002)
+    shot = measure_shadows(spray.images, search_of(spray, MARGIN_VOXEL), light="gaussian")
+    ratio = float(shot.droplets.diameters_um.mean() / (1000 * spray.diameters_mm.mean()))
+    assert (ratio > 1.2) is cut, "the mean diameter is that of a part"
+    assert [reason for reason in shot.reasons if "goes on below" in reason and "D10 is too large" in reason] == (
+        list(shot.reasons) if cut else []
+    )
+    assert (shot.verdict is ShotVerdict.DOUBTFUL) is cut
+
+
 def test_a_dense_spray_that_two_views_do_not_know_a_band_of_is_doubted() -> None:
     """A third of what is told is ghosts, and droplets and ghosts together explain the images well."""
     grid = study_grid((250, 20, 500))

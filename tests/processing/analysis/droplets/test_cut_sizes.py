@@ -1,0 +1,38 @@
+"""Sprays that are cut by what can be seen, against the share that is really missing."""
+
+import numpy as np
+import pytest
+
+from processing.analysis.droplets.verdicts.cut_sizes import cut_off
+
+LIMIT_UM = 12.0
+
+
+def told(median_um: float, spread: float, count: int, seed: int) -> str:
+    diameters_um = median_um * np.exp(spread * np.random.default_rng(seed).standard_normal(count))
+    return cut_off(diameters_um[diameters_um > LIMIT_UM], LIMIT_UM)
+
+
+@pytest.mark.parametrize(("median_um", "spread", "missing"), [(14.0, 0.35, 33), (12.0, 0.4, 50), (16.0, 0.5, 28)])
+def test_the_share_that_is_missing_is_told(median_um: float, spread: float, missing: int) -> None:
+    shares = [int(told(median_um, spread, 1500, seed).split("%")[0].split()[-1]) for seed in range(10)]
+    assert np.mean(shares) == pytest.approx(missing, abs=6)
+
+
+@pytest.mark.parametrize("count", [20, 50, 100, 1000])
+@pytest.mark.parametrize(
+    ("median_um", "spread"), [(25.0, 0.35), (30.0, 0.4), (40.0, 0.5), (17.0, 0.1), (20.0, 0.2), (60.0, 0.7)]
+)
+def test_a_distribution_that_ends_above_the_limit_is_not_doubted(median_um: float, spread: float, count: int) -> None:
+    """At most 2 % of these are smaller: in 50 sprays each hardly one is called cut."""
+    assert sum(bool(told(median_um, spread, count, seed)) for seed in range(50)) <= 2
+
+
+def test_two_sizes_of_which_none_is_near_the_limit_are_whole() -> None:
+    two = np.random.default_rng(0).normal([18.0, 80.0], [1.0, 5.0], (200, 2)).ravel()
+    assert cut_off(two, LIMIT_UM) == ""
+
+
+def test_nothing_is_said_of_few_or_where_nobody_knows_the_limit() -> None:
+    assert cut_off(np.full(9, 12.5), LIMIT_UM) == ""
+    assert cut_off(np.linspace(12.0, 20.0, 300), np.zeros(300)) == ""
