@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from processing.analysis.alone_droplets import alone_in_shots
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.geometry import FloatArray
 
@@ -32,7 +33,7 @@ def velocity_doubts(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
     velocities = [json.loads(str(shot.provenance.get("velocity", "{}"))) for shot in shots]
     flying = [(shot, rows) for shot in shots if (rows := _flying(shot)) is not None]
     unsure = (f"velocities of {count} shots {why}" for count, why in _unsure(velocities))
-    return (*unsure, *_against(flying), *_faster(flying))
+    return (*unsure, *alone_in_shots(shots).told, *_against(flying), *_faster(flying))
 
 
 Flying = Sequence[tuple[StoredDroplets, FloatArray]]

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict
 
 from daq.files.run_directory import RunHeader
+from processing.analysis.alone_droplets import MOST_ALONE, REMEDY
 from processing.calibration.verdict import Unchecked
 from processing.preprocessing import Polarity
 
@@ -119,20 +120,16 @@ def stated_rate(rate_hz: float) -> Unchecked:
     )
 
 
-MOST_ALONE = 0.05
-"""Share of the droplets of a double exposure that may lack a partner without a word."""
-
-
-def unlike_motions(shares_paired: Sequence[float]) -> list[Unchecked]:
-    """Of double exposures in which so many droplets of each have a partner."""
-    if not shares_paired or (alone := 1 - sum(shares_paired) / len(shares_paired)) <= MOST_ALONE:
+def unlike_motions(shares_alone: Sequence[float]) -> list[Unchecked]:
+    """Of double exposures that are good, in which so many droplets of each lack the partner that they should have."""
+    if not shares_alone or (alone := sum(shares_alone) / len(shares_alone)) <= MOST_ALONE:
         return []
     return [
         Unchecked(
-            f"how the {100 * alone:.0f} % of the droplets fly that have no partner: in a second motion (another "
-            "stream, a wake, droplets too fast for the separation) mean velocity and flux are not those of all",
-            "a shorter separation, in which all droplets move by less than their neighbours are away; or a box around "
-            "each of the streams",
+            f"how the {100 * alone:.0f} % of the droplets fly that should be in both exposures and have no partner: as "
+            "ghosts they do not; in another motion, beyond reach or of hardly any, mean velocity and flux are not "
+            "those of all",
+            REMEDY,
         )
     ]
 

@@ -6,12 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.analysis.alone_droplets import Alone, alone_among
 from processing.analysis.droplets.droplet_table import Columns, Droplets, SizedDroplets
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import Pairing, pair
 from processing.analysis.velocity.velocity_table import M_S_PER_MM_NS, Velocities
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S, judged
+from processing.analysis.watched_droplets import staying
 from processing.volume import VoxelGrid
 
 Rows = Droplets | SizedDroplets
@@ -28,7 +30,10 @@ class MeasuredVelocities:
     separation_ns : float
         Time from A to B.
     stayed : int
-        Droplets of A that should be in the grid in B, too, by the motion of their neighbours.
+        Droplets of A that should be in the grid in B, too, by the motion of their neighbours; of those without a
+        partner, whichever of the motions is theirs.
+    alone : Alone
+        Droplets of both that should have a partner, and have none.
     verdict : ShotVerdict
         What velocities are good for; where they are refused, no droplet has one.
     reasons : tuple of str
@@ -39,6 +44,7 @@ class MeasuredVelocities:
     second: Velocities
     separation_ns: float
     stayed: int
+    alone: Alone
     verdict: ShotVerdict
     reasons: tuple[str, ...]
 
@@ -75,7 +81,8 @@ def measure_velocities(
 ) -> MeasuredVelocities:
     """Find for every droplet of exposure A the one of B that it is, and its velocity.
 
-    No motion need be known: displacements may be as large as 25 voxels. Errors of the calibration are the same in both
+    No motion need be known: displacements of most droplets may be as large as 25 voxels. Droplets to which that gives
+    no partner may have a motion of their own, of up to 75 voxels. Errors of the calibration are the same in both
     exposures, and cancel; so the covariance is that of the two places by noise.
 
     Parameters
@@ -105,11 +112,12 @@ def measure_velocities(
         raise ValueError("droplets lie outside of the grid: is it the one that they were measured in?")
     pairing = pair(before, after)
     stayed = _stayed(before, pairing, grid)
-    verdict, reasons = judged((first, second), (before, after), pairing, stayed)
+    alone = _alone(first.droplets, second.droplets, pairing, grid)
+    verdict, reasons = judged((first, second), (before, after), pairing, stayed, alone)
     if verdict is ShotVerdict.REFUSED:
         pairing = pairing.disbelieved()
     of_first, of_second = _velocities(first.droplets, second.droplets, pairing, separation_ns)
-    told = MeasuredVelocities(of_first, of_second, separation_ns, stayed, verdict, reasons)
+    told = MeasuredVelocities(of_first, of_second, separation_ns, stayed, alone, verdict, reasons)
     if (speed_m_s := float(np.linalg.norm(told.mean_m_s or 0.0))) <= FASTEST_M_S:
         return told
     doubt = (
@@ -125,11 +133,20 @@ def _within(droplets: MovingDroplets, grid: VoxelGrid) -> NDArray[np.bool_]:
 
 
 def _stayed(before: MovingDroplets, pairing: Pairing, grid: VoxelGrid) -> int:
-    if pairing.shifts is None:
+    if not len(pairing.motions):
         return 0
-    there = before.places + pairing.shifts
-    inside = np.all((there >= -0.5) & (there < np.array(grid.shape[::-1]) - 0.5), axis=1)
-    return int(np.count_nonzero(inside))
+    there = before.places + pairing.motions
+    inside = np.all((there >= -0.5) & (there < np.array(grid.shape[::-1]) - 0.5), axis=(0, 2))
+    return int(np.count_nonzero(inside | (pairing.first.partner >= 0)))
+
+
+def _alone(before: Rows, after: Rows, pairing: Pairing, grid: VoxelGrid) -> Alone:
+    """Droplets of both exposures that stay in the grid, and have no partner."""
+    points_mm = np.concatenate([before.points_mm, after.points_mm])
+    of_first, of_second = pairing.first.partner, pairing.second.partner
+    partner = np.concatenate([np.where(of_first >= 0, of_first + len(before), -1), of_second])
+    stays = staying(points_mm, np.arange(len(points_mm)) < len(before), partner, grid)
+    return alone_among(np.concatenate([before.p_real, after.p_real])[stays], partner[stays] >= 0)
 
 
 def _velocities(before: Rows, after: Rows, pairing: Pairing, separation_ns: float) -> tuple[Velocities, Velocities]:

@@ -1,5 +1,6 @@
 """Candidates for a partner, and how likely each is: against strangers, against each other, and against no partner."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,11 +36,19 @@ class Spread:
         Standard deviation of the logarithm of the ratio of their sizes.
     share : float
         Of the droplets that have a partner.
+    elsewhere : float
+        Of the droplets that have one in another motion.
     """
 
     scatter: float = FIRST_SCATTER_VOXEL
     unlikeness: float = FIRST_UNLIKENESS
     share: float = FIRST_SHARE
+    elsewhere: float = 0.0
+
+    @property
+    def alone(self) -> float:
+        """Share of the droplets without any partner."""
+        return 1 - self.share - self.elsewhere
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +83,15 @@ class Candidates:
     other: Indices
     misses: FloatArray
 
+    @classmethod
+    def joined(cls, several: "Sequence[Candidates]") -> "Candidates":
+        """All of them, one after the other."""
+        return cls(*(np.concatenate([getattr(one, name) for one in several]) for name in ("own", "other", "misses")))
+
+    def where(self, chosen: Indices) -> "Candidates":
+        """The chosen ones, by index."""
+        return Candidates(self.own[chosen], self.other[chosen], self.misses[chosen])
+
 
 def candidates_near(first: MovingDroplets, second: MovingDroplets, shifts: FloatArray) -> Candidates:
     """Pairs (A, B) of which B is near the place where A should have gone.
@@ -101,7 +119,7 @@ def odds_of(candidates: Candidates, first: MovingDroplets, second: MovingDroplet
     there = np.exp(-0.5 * far) / np.sqrt((2 * np.pi) ** 3 * np.linalg.det(covariance))
     stranger = np.sqrt(_density(first.places)[own] * _density(second.places)[other])
     alike = _alikeness(first.log_sizes[own], second.log_sizes[other], spread.unlikeness, second.log_sizes)
-    return np.asarray(spread.share / (1 - spread.share) ** 2 * there / stranger * alike)
+    return np.asarray(spread.share / spread.alone**2 * there / stranger * alike)
 
 
 def likely_of(candidates: Candidates, odds: FloatArray) -> FloatArray:

@@ -6,51 +6,20 @@ size tell that are surely real.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from processing.analysis.droplets.droplet_file import DIAMETER, FRAME, StoredDroplets
+from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import NO_P_REAL, NO_VOLUME, P_REAL, measured_grid
-from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.estimates import CONFIDENCE, Estimate
-from processing.geometry import FloatArray
-from processing.volume import VoxelGrid
+from processing.analysis.watched_droplets import SURE, Watched, watched
 
-SURE = 0.95
-"""Droplets that are more probably real tell how often real ones have a partner."""
 FEWEST_SURE, MOST_CLASSES = 50, 10
 """Of a class of sizes; all classes have as many."""
 MODEL_SD, LEAST_SD = 0.2, 0.002
 """Of the share, relative and absolute, beyond chance: among the cases that were tried."""
-AMPLITUDE, PARTNER = "amplitude", "partner"
-
-
-@dataclass(frozen=True, eq=False)
-class Watched:
-    """Droplets that should be in the grid in the other exposure, too.
-
-    Parameters
-    ----------
-    rows : (N,) int array
-        Of the table.
-    sizes : (N,) array
-        Diameters, or amplitudes.
-    p_real : (N,) array
-        Probability of being real.
-    paired : (N,) bool array
-        Whether they have a partner.
-    """
-
-    rows: NDArray[np.intp]
-    sizes: FloatArray
-    p_real: FloatArray
-    paired: NDArray[np.bool_]
-
-    def __len__(self) -> int:
-        return len(self.sizes)
 
 
 def ghost_share_by_partners(shots: Sequence[StoredDroplets]) -> Estimate | str:
@@ -59,31 +28,6 @@ def ghost_share_by_partners(shots: Sequence[StoredDroplets]) -> Estimate | str:
         return NO_P_REAL
     seen = [watched(shot.columns, grid) for shot in shots if (grid := measured_grid(shot))]
     return unpaired_ghost_share(seen) if seen else NO_VOLUME
-
-
-def watched(columns: Columns, grid: VoxelGrid) -> Watched:
-    """Those of a shot: droplets that stay in the grid, whichever of the displacements of all pairs were theirs.
-
-    Parameters
-    ----------
-    columns : mapping of name to (N,) array
-        As files have them, exposures A and B.
-    grid : VoxelGrid
-        In which they were measured.
-    """
-    points_mm = np.column_stack([np.asarray(columns[name], np.float64) for name in ("x_mm", "y_mm", "z_mm")])
-    first, partner = columns[FRAME].astype("U1") == "a", np.asarray(columns[PARTNER], np.intp)
-    own = np.flatnonzero(first & (partner >= 0))
-    moved_mm = points_mm[partner[own]] - points_mm[own]
-    stays = np.zeros(len(first), bool)
-    if len(own):
-        sign = np.where(first, 1, -1)[:, None]
-        ends = [grid.to_index(points_mm + sign * end)[:, ::-1] for end in (moved_mm.min(axis=0), moved_mm.max(axis=0))]
-        stays = np.all([(end >= -0.5) & (end < np.array(grid.shape[::-1]) - 0.5) for end in ends], axis=(0, 2))
-    sizes, p_real = (
-        columns[name].astype(np.float64) for name in (DIAMETER if DIAMETER in columns else AMPLITUDE, P_REAL)
-    )
-    return Watched(np.flatnonzero(stays), sizes[stays], p_real[stays], partner[stays] >= 0)
 
 
 def unpaired_ghost_share(shots: Sequence[Watched]) -> Estimate | str:

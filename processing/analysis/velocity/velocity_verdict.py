@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from processing.analysis.alone_droplets import Alone
 from processing.analysis.droplets.droplet_table import DropletRows
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
 from processing.analysis.velocity.common_motion import REACH_VOXEL
@@ -18,7 +19,8 @@ FASTEST_M_S = 1000.0
 LEAST_NOISE = 0.1
 """Of the noise of displacements. An image that is there twice has none."""
 STILL, MOST_STILL = 2.0, 0.5
-"""Standard deviations of displacement or velocity below which nothing is known to move, and share of the droplets."""
+"""Standard deviations of displacement or velocity below which nothing is known to move, and share of the droplets of
+a motion."""
 Verdict = tuple[ShotVerdict, tuple[str, ...]]
 
 
@@ -27,6 +29,7 @@ def judged(
     droplets: tuple[MovingDroplets, MovingDroplets],
     pairing: Pairing,
     stayed: int,
+    alone: Alone,
 ) -> Verdict:
     """Verdict and reasons.
 
@@ -40,6 +43,8 @@ def judged(
         Of the two.
     stayed : int
         Droplets of A that should be in the grid in B, too.
+    alone : Alone
+        Droplets of both that should have a partner, and have none.
     """
     for name, exposure in zip("AB", exposures, strict=True):
         if exposure.verdict in (ShotVerdict.EMPTY, ShotVerdict.REFUSED):
@@ -54,9 +59,9 @@ def judged(
     if share < LEAST_SHARE:
         return ShotVerdict.REFUSED, (_few(share, LEAST_SHARE),)
     doubts = [f"exposure {name} is doubtful" for name, one in zip("AB", exposures, strict=True) if one.reasons]
-    doubts += [_few(share, TRUSTED_SHARE)] if share < TRUSTED_SHARE else []
     doubts += [_ambiguous(wrong)] if wrong > MOST_WRONG else []
-    doubts += [_at_rest(still)] if (still := _still_share(droplets, pairing)) > MOST_STILL else []
+    doubts += [_few(share, TRUSTED_SHARE)] if share < TRUSTED_SHARE else alone.told
+    doubts += [_at_rest(still)] if (still := _still_share(droplets, pairing)) else []
     return (ShotVerdict.DOUBTFUL if doubts else ShotVerdict.GOOD), tuple(doubts)
 
 
@@ -73,9 +78,11 @@ def _is_copy(droplets: tuple[MovingDroplets, MovingDroplets], pairing: Pairing) 
 
 
 def _still_share(droplets: tuple[MovingDroplets, MovingDroplets], pairing: Pairing) -> float:
-    """Of the droplets with a partner, those that are not known to move."""
+    """Of the droplets with a partner, those in motions in which most are not known to move."""
     moved, variances = _moved(droplets, pairing)
-    return float(np.mean(np.sum(moved**2, axis=1) < STILL**2 * np.sum(variances, axis=1)))
+    still, motion = np.sum(moved**2, axis=1) < STILL**2 * np.sum(variances, axis=1), pairing.motion[pairing.motion >= 0]
+    of_motions = [still[motion == one] for one in range(len(pairing.motions))]
+    return sum(np.count_nonzero(one) for one in of_motions if np.mean(one) > MOST_STILL) / len(still)
 
 
 def _moved(droplets: tuple[MovingDroplets, MovingDroplets], pairing: Pairing) -> tuple[FloatArray, FloatArray]:

@@ -40,6 +40,7 @@ class ShotVelocity(FrozenValue):
     pairs: int
     stayed: int
     share_paired: float | None
+    share_alone: float | None
     wrong_share: float | None
     mean_m_s: tuple[float, float, float] | None
     separation_ns: float
@@ -115,6 +116,7 @@ def _told_velocity(velocities: MeasuredVelocities, separation: Separation) -> Sh
         pairs=velocities.pairs,
         stayed=velocities.stayed,
         share_paired=velocities.share_paired,
+        share_alone=velocities.alone.share,
         wrong_share=velocities.wrong_share,
         mean_m_s=velocities.mean_m_s,
         separation_ns=separation.mean_ns,

@@ -51,5 +51,6 @@ def tell_unchecked(
         sparse=not depth_known(sights) and not depth_reversed(sights),
     )
     rows = even_rows(row_spacing_mm) if any(shot.velocity and shot.velocity.pairs for shot in shots) else []
-    paired = [shot.velocity.share_paired for shot in shots if shot.velocity and shot.velocity.share_paired is not None]
-    return told_unchecked([*unchecked, *rows, *unlike_motions(paired), *cropped], progress)
+    good = [shot.velocity for shot in shots if shot.velocity and shot.velocity.verdict == "good"]
+    alone = [velocity.share_alone for velocity in good if velocity.share_alone is not None]
+    return told_unchecked([*unchecked, *rows, *unlike_motions(alone), *cropped], progress)

@@ -5,32 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.bright_shot import SeenView
-from processing.analysis.droplets.droplet_table import Droplets
-from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict
+from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.volume import VoxelGrid
+from tests.support.measured_exposures import GRID, PITCH_MM, measured
 from tests.support.moving_droplets import BOX, Exposed, exposures
-
-PITCH_MM = 1 / 60
-GRID = VoxelGrid((200, 80, 300), (-2.0, 1.0, 0.5), PITCH_MM)
-Exposure = MeasuredExposure[Droplets, SeenView]
-
-
-def measured(exposed: Exposed, grid: VoxelGrid = GRID, verdict: ShotVerdict = ShotVerdict.GOOD) -> Exposure:
-    seen, count = exposed.droplets, len(exposed.labels)
-    droplets = Droplets(
-        points_mm=seen.places * grid.pitch_mm + grid.origin_mm,
-        covariance_mm2=seen.covariance * grid.pitch_mm**2,
-        amplitudes=np.exp(seen.log_sizes),
-        amplitude_sd=np.zeros(count),
-        views=np.full(count, 4),
-        residual=np.ones(count),
-        p_real=np.ones(count),
-    )
-    reasons = () if verdict is ShotVerdict.GOOD else ("because",)
-    return MeasuredExposure(droplets, {}, 1.0, verdict, reasons)
 
 
 def of(first: Exposed, second: Exposed, separation_ns: float = 6400.0) -> MeasuredVelocities:
