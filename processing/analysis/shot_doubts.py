@@ -8,6 +8,7 @@ import numpy as np
 
 from processing.analysis.alone_droplets import alone_in_shots
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.unlike_numbers import unlike_numbers_of_shots
 from processing.geometry import FloatArray
 
 COMPONENTS = ("u_m_s", "v_m_s", "w_m_s")
@@ -25,7 +26,9 @@ def exposure_doubts(shots: Sequence[StoredDroplets], frames: str = "ab") -> tupl
     """Doubts on the exposures of some frames."""
     told = [json.loads(str(shot.provenance.get("exposures", "{}"))) for shot in shots]
     exposures = [exposure for shot in told for frame, exposure in shot.items() if frame in frames]
-    return tuple(f"{count} exposures {why}" for count, why in _unsure(exposures))
+    unsure = tuple(f"{count} exposures {why}" for count, why in _unsure(exposures))
+    numbers = unlike_numbers_of_shots(shots) if set(frames) >= {"a", "b"} else ""
+    return (*unsure, *([numbers] if numbers else []))
 
 
 def velocity_doubts(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from processing.analysis.droplets.ghost_share import pooled, told_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure
 from processing.analysis.estimates import Estimate
+from processing.analysis.unlike_numbers import unlike_numbers
 from processing.analysis.unlike_sizes import unlike_sizes
 from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
 from processing.reconstruction.settings import FrozenValue
@@ -24,12 +25,15 @@ MOST_SPREAD = 0.01
 
 
 def compared(exposures: tuple[Exposure, ...], velocities: MeasuredVelocities | None) -> tuple[Exposure, ...]:
-    """The same exposures, doubted where droplets of A and the very same ones of B have other diameters."""
-    if velocities is None:
+    """The same exposures, doubted where A and B differ: in numbers, or in diameters of the very same droplets."""
+    if len(exposures) < 2:
         return exposures
     first, second = exposures
-    told = unlike_sizes(first.droplets, second.droplets, velocities)
-    return tuple(exposure.doubted((told,) if told else ()) for exposure in exposures)
+    known = all(one.verdict is not ShotVerdict.REFUSED for one in exposures)
+    numbers = unlike_numbers(len(first.droplets), len(second.droplets)) if known else ""
+    sizes = unlike_sizes(first.droplets, second.droplets, velocities) if velocities else ""
+    told = tuple(one for one in (numbers, sizes) if one)
+    return tuple(exposure.doubted(told) for exposure in exposures)
 
 
 class ShotVelocity(FrozenValue):

@@ -1,0 +1,52 @@
+"""Do both exposures show as many droplets? They show the same ones, but for a few that fly into the box or out of it.
+
+Densities and means are of both exposures together, and nothing else tells where one of them lacks its light, or its
+spray: an exposure without droplets is a good one of an empty box.
+"""
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import bdtr
+
+from processing.analysis.droplets.droplet_file import FRAME, StoredDroplets
+from processing.analysis.droplets.droplet_statistics import REFUSED
+
+MOST_RATIO, MOST_RATIO_OF_SHOTS = 1.5, 1.1
+"""Of the larger number to the smaller one, of one shot, and of all shots together."""
+CHANCE = 0.01
+"""How often as many droplets of one density fall on two exposures so unlike, were they not the very same ones."""
+
+
+def unlike_numbers(first: int, second: int, most_ratio: float = MOST_RATIO) -> str:
+    """What is wrong where exposure A has so many droplets, and B so many others; empty where nothing says so.
+
+    Parameters
+    ----------
+    first, second : int
+        Droplets of A, and of B.
+    most_ratio : float
+        Of the larger number to the smaller one.
+    """
+    fewer, more = sorted((first, second))
+    if more <= most_ratio * fewer or 2 * bdtr(fewer, fewer + more, 0.5) > CHANCE:
+        return ""
+    return (
+        f"exposure A has {first} droplets, B {second}: both show the same ones, but for a few that fly into the box or "
+        "out of it; densities and means are of both together. Does the light flash in both, as bright, and does the "
+        "spray last from A to B?"
+    )
+
+
+def unlike_numbers_of_shots(shots: Sequence[StoredDroplets]) -> str:
+    """The same of all double exposures together, of which neither exposure is refused."""
+    numbers = [
+        int(np.count_nonzero(shot.columns[FRAME].astype("U1") == frame))
+        for shot in shots
+        for told in [json.loads(str(shot.provenance.get("exposures", "{}")))]
+        if {"a", "b"} <= told.keys() and all(one.get("verdict") != REFUSED for one in told.values())
+        for frame in "ab"
+    ]
+    told = unlike_numbers(sum(numbers[::2]), sum(numbers[1::2]), MOST_RATIO_OF_SHOTS)
+    return f"all shots together: {told}" if told else ""

@@ -1,0 +1,58 @@
+"""Exposures A and B of one shot show the same droplets: where one has far fewer, that is told."""
+
+import json
+
+import numpy as np
+import pytest
+
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.analysis.shot_doubts import exposure_doubts
+from processing.runs.droplets.measured_shot import compared
+from tests.support.measured_exposures import measured
+from tests.support.moving_droplets import exposures
+
+EMPTY = np.arange(0)
+
+
+def shot(first: int, second: int, verdict: str = "good") -> StoredDroplets:
+    told = {"a": {"verdict": "good"}, "b": {"verdict": verdict}}
+    return StoredDroplets({"frame": np.repeat(["a", "b"], [first, second])}, {"exposures": json.dumps(told)})
+
+
+@pytest.mark.parametrize("count", [0, 10])
+def test_an_exposure_without_most_droplets_makes_both_doubtful(count: int) -> None:
+    first, second = exposures(density_per_mm3=2.0)
+    pair = measured(first), measured(second.reordered(np.arange(count)))
+    told = compared(pair, None)
+    assert [one.verdict for one in told] == [ShotVerdict.DOUBTFUL] * 2
+    assert f"exposure A has {len(first.labels)} droplets, B {count}" in told[0].reasons[0]
+
+
+def test_exposures_with_about_as_many_stay_good() -> None:
+    for seed in range(20):
+        first, second = exposures(seed, 1.0, found=0.95, ghosts=0.1)
+        told = compared((measured(first), measured(second)), None)
+        assert [one.verdict for one in told] == [ShotVerdict.GOOD] * 2
+
+
+def test_few_droplets_may_be_in_one_exposure_by_chance() -> None:
+    first, second = exposures(density_per_mm3=0.5)
+    told = compared((measured(first.reordered(np.arange(6))), measured(second.reordered(EMPTY))), None)
+    assert [one.verdict for one in told] == [ShotVerdict.GOOD] * 2
+
+
+def test_a_refused_exposure_is_not_counted() -> None:
+    first, second = exposures(density_per_mm3=2.0)
+    refused = measured(second.reordered(EMPTY), verdict=ShotVerdict.REFUSED)
+    told = compared((measured(first), refused), None)
+    assert [one.verdict for one in told] == [ShotVerdict.GOOD, ShotVerdict.REFUSED]
+    assert exposure_doubts([shot(40, 0, "refused")] * 3) == ("3 of 6 exposures are refused, and do not count",)
+
+
+def test_all_shots_together_tell_a_smaller_difference() -> None:
+    assert exposure_doubts([shot(40, 33)] * 3) == ()
+    (told,) = exposure_doubts([shot(40, 33)] * 20)
+    assert "all shots together: exposure A has 800 droplets, B 660" in told
+    assert exposure_doubts([shot(40, 38)] * 100) == ()
+    assert exposure_doubts([shot(40, 33)] * 20, "a") == ()
