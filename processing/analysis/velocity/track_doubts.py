@@ -6,7 +6,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.analysis.alone_droplets import alone_among
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.droplet_statistics import P_REAL, measured_grid
 from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.shot_doubts import COMPONENTS
 from processing.analysis.velocity.common_motion import Indices
@@ -29,6 +31,11 @@ LEAST_JUMP, LEAST_JUMP_VOXEL, SURE = 0.15, 0.2, 5.0
 voxel, and standard deviations by which it is known."""
 THIN = 0.5
 """Share of the droplets of a shot that tracks link to the next one, below which they are paired anew."""
+MOST_OFF = 0.02
+"""Share of the surely real droplets that may be on no track: of one that stays in the grid tracks see five shots."""
+WATCHED, COMMON_WAYS = 2, (0.01, 0.99)
+"""Shots before and after a droplet that should be on a track, and quantiles of the velocities that it may have."""
+MM_PER_M = 1000.0
 TINY = 1e-12
 
 
@@ -96,6 +103,35 @@ def still_doubts(tracks: Columns) -> Iterator[str]:
         return
     if (share := float(np.mean(speeds_m_s[known] < STILL * sd_m_s[known]))) > MOST_STILL:
         yield f"{100 * share:.0f} % of the droplets on tracks stand still, as sure as that is known: is it dirt?"
+
+
+def alone_doubts(tracks: Columns, shots: Sequence[StoredDroplets], rate_hz: float) -> Iterator[str]:
+    """Droplets on no track that would stay in the grid for two shots before and after, were they like those on tracks.
+
+    Parameters
+    ----------
+    tracks, shots, rate_hz
+        As of ``rate_doubts``.
+    """
+    velocities_m_s = np.column_stack([np.asarray(tracks[name], np.float64) for name in COMPONENTS])
+    flying = velocities_m_s[np.isfinite(velocities_m_s).all(axis=1)]
+    if not len(flying) or not (grid := measured_grid(shots[0])):
+        return
+    ways_mm = np.quantile(flying, COMMON_WAYS, axis=0) * MM_PER_M / rate_hz
+    numbers = {int(shot.provenance["shot"]) for shot in shots}
+    p_real, on_track = [np.empty(0)], [np.empty(0, np.bool_)]
+    for shot in shots:
+        number = int(shot.provenance["shot"])
+        if P_REAL not in shot.columns or not numbers >= {number + one for one in range(-WATCHED, WATCHED + 1)}:
+            continue
+        of_a = shot.columns["frame"] == "a"
+        points_mm = np.column_stack([np.asarray(shot.columns[f"{axis}_mm"], np.float64)[of_a] for axis in "xyz"])
+        stays = np.all([grid.holds(points_mm + one * way) for one in (-WATCHED, WATCHED) for way in ways_mm], axis=0)
+        linked = np.isin(np.arange(len(points_mm)), tracks["droplet"][tracks["shot"] == number])
+        p_real.append(np.asarray(shot.columns[P_REAL], np.float64)[of_a][stays])
+        on_track.append(linked[stays])
+    alone = alone_among(np.concatenate(p_real), np.concatenate(on_track))
+    yield from alone.said("stay in the grid are on no track", "are not seen again", MOST_OFF)
 
 
 def uneven_doubts(frames: Sequence[MovingDroplets], ids: Sequence[Indices], first: int) -> Iterator[str]:

@@ -16,7 +16,13 @@ from processing.analysis.velocity import HALF_WINDOW
 from processing.analysis.velocity.common_motion import FEWEST
 from processing.analysis.velocity.moving_droplets import LEAST_SIZE, MovingDroplets
 from processing.analysis.velocity.noise_curve import M_PER_MM, NoiseCurve, noise_curve
-from processing.analysis.velocity.track_doubts import order_doubts, rate_doubts, still_doubts, uneven_doubts
+from processing.analysis.velocity.track_doubts import (
+    alone_doubts,
+    order_doubts,
+    rate_doubts,
+    still_doubts,
+    uneven_doubts,
+)
 from processing.analysis.velocity.track_motion import TrackPoints, track_points
 from processing.analysis.velocity.tracks import LEAST_LENGTH, Tracks, link
 from processing.analysis.velocity.velocity_table import COVARIANCES
@@ -115,13 +121,14 @@ def track_droplets(
     points = track_points(frames, linked, half_window)
     columns = _columns(points, linked, first, grid, rate_hz) | _sizes(points, first, ordered)
     count = sum(map(len, frames))
-    doubts = (
-        *exposure_doubts(ordered, "a"),
+    contradicted = (
         *rate_doubts(columns, ordered, rate_hz),
         *order_doubts(columns, ordered),
         *uneven_doubts(frames, linked.ids, first),
         *still_doubts(columns),
     )
+    alone = alone_doubts(columns, ordered, rate_hz) if not contradicted else ()
+    doubts = (*exposure_doubts(ordered, "a"), *contradicted, *alone)
     reason = None if linked.count else _why(frames)
     curve = noise_curve(frames, linked, grid.pitch_mm, rate_hz)
     return DropletTracks(columns, linked.count, count, rate_hz, reason, doubts, half_window, curve)
