@@ -84,7 +84,10 @@ class SizeClass(FrozenValue):
 
 
 def mean_diameters(
-    diameters_um_by_shot: Iterable[ArrayLike], exposures_per_shot: float = 1, confidence: float = CONFIDENCE
+    diameters_um_by_shot: Iterable[ArrayLike],
+    exposures_per_shot: float = 1,
+    confidence: float = CONFIDENCE,
+    weights_by_shot: Iterable[ArrayLike] | None = None,
 ) -> SizeStatistics:
     """Mean diameters, quantiles by volume and relative span, with intervals.
 
@@ -96,18 +99,22 @@ def mean_diameters(
         2 where exposures A and B, which show the same droplets, are both in the array of a shot.
     confidence : float
         Of the intervals.
+    weights_by_shot : iterable of (N,) arrays, optional
+        For how many droplets each one stands; by default for itself.
 
     Raises
     ------
     ValueError
-        A diameter is not finite and above 0, or there are diameters where shots should be.
+        A diameter or a weight is not finite and above 0, or there are diameters where shots should be.
     """
     by_shot = tuple(diameters_um_by_shot)
+    weights = [np.ones(np.shape(one)) for one in by_shot] if weights_by_shot is None else list(weights_by_shot)
     if any(np.ndim(diameters_um) != 1 for diameters_um in by_shot):
         raise ValueError("diameters by shot, please: a list of arrays; of a single shot [diameters_um]")
-    checked = (np.sort(_checked(diameters_um)) for diameters_um in by_shot)
+    checked = (_sorted(*one) for one in zip(by_shot, weights, strict=True))
     shots = sorted((shot for shot in checked if len(shot)), key=np.ndarray.tolist)  # draws depend on no order
-    diameters_um = np.concatenate([np.empty(0), *shots])
+    weighted = np.concatenate([np.empty((0, 2)), *shots])
+    diameters_um = weighted[:, 0]
     if len(diameters_um) < FEWEST * exposures_per_shot:
         reason = TOO_FEW if len(diameters_um) else NOTHING_MEASURED
         return SizeStatistics(n=len(diameters_um), shots=len(shots), reason=reason)
@@ -115,9 +122,9 @@ def mean_diameters(
     units = np.repeat(np.arange(len(shots)), [len(shot) for shot in shots]) if several else np.arange(len(diameters_um))
     order = np.argsort(diameters_um, kind="stable")
     own = float(np.sqrt(exposures_per_shot))
-    estimates = _estimates(diameters_um[order], units[order], 1.0 if several else own, confidence)
+    estimates = _estimates(weighted[order], units[order], 1.0 if several else own, confidence)
     if several and len(shots) < FEW_SHOTS:
-        counted = _estimates(diameters_um[order], np.arange(len(order)), own, confidence, COUNTED_DRAWS)
+        counted = _estimates(weighted[order], np.arange(len(order)), own, confidence, COUNTED_DRAWS)
         counted.pop(SPAN, None)  # of a span, intervals that are narrower than that hold the truth in 81 to 88 % of 90 %
         estimates = {name: one.no_surer_than(counted.get(name)) for name, one in estimates.items()}
     known = _known(estimates, diameters_um[order], FEWEST * exposures_per_shot)
@@ -211,6 +218,12 @@ def class_numbers(diameters_um: ArrayLike) -> NDArray[np.intp]:
     return np.floor(CLASSES_PER_DECADE * np.log10(_checked(diameters_um)) + 1e-9).astype(np.intp)
 
 
+def _sorted(diameters_um: ArrayLike, weights: ArrayLike) -> FloatArray:
+    """Diameters and weights, (N, 2), the smallest first."""
+    rows = np.column_stack([_checked(diameters_um), _checked(weights)])
+    return np.asarray(rows[np.lexsort(rows.T[::-1])])
+
+
 def _checked(diameters_um: ArrayLike) -> FloatArray:
     require_unmasked("diameters", diameters_um)
     array = np.asarray(diameters_um, dtype=np.float64).ravel()
@@ -248,10 +261,11 @@ def _size_class(
 
 
 def _estimates(
-    diameters_um: FloatArray, units: NDArray[np.intp], widening: float, confidence: float, number: int = DRAWS
+    weighted: FloatArray, units: NDArray[np.intp], widening: float, confidence: float, number: int = DRAWS
 ) -> dict[str, Estimate]:
-    """Figures of sorted diameters, with intervals; diameters by their logarithm, so that no limit is below 0."""
-    powers = diameters_um ** np.arange(5)[:, None]
+    """Figures of sorted diameters and their weights, with intervals; by logarithms, so that no limit is below 0."""
+    diameters_um, weights = weighted.T
+    powers = weights * diameters_um ** np.arange(5)[:, None]
     names = [*(f"d{p}{q}_um" for p, q in ORDERS), *BY_VOLUME, SPAN]
     told = estimated(
         lambda counts: _figures(diameters_um, powers, counts[:, units]),

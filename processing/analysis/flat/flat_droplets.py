@@ -14,6 +14,7 @@ from processing.analysis.flat.darkness import Darkness, Image, darkness_of
 from processing.analysis.flat.discs_in_outline import Disc, discs_in
 from processing.analysis.flat.outline import Outline, outline_around
 from processing.analysis.flat.spots import Spot, find_spots
+from processing.analysis.flat.whole_share import whole_shares
 from processing.geometry import FloatArray
 from processing.grey_image import require_image
 from processing.preprocessing import Polarity
@@ -68,6 +69,8 @@ class FlatDroplets:
     overlapping : (N,) bool array
         Another shadow reaches into the outline; where it is that of several discs, each is the largest that finds
         room in it, and its blur is not a number.
+    whole_shares : (N,) array
+        Share of the image in which the centre of one as large may lie if it is seen whole.
     left_out : dict of reason to number
         What was seen and is not among them: ``border``, ``not_round``, ``unsharp``, ``small``.
     """
@@ -79,13 +82,14 @@ class FlatDroplets:
     depths: FloatArray
     circularity: FloatArray
     overlapping: NDArray[np.bool_]
+    whole_shares: FloatArray
     left_out: dict[str, int]
 
     @classmethod
     def none(cls) -> "FlatDroplets":
         """No droplets."""
         empty = np.empty(0)
-        return cls(np.empty((0, 2)), empty, empty, empty, empty, empty, np.empty(0, bool), {})
+        return cls(np.empty((0, 2)), empty, empty, empty, empty, empty, np.empty(0, bool), empty, {})
 
     def __len__(self) -> int:
         return len(self.diameters_px)
@@ -101,6 +105,7 @@ class FlatDroplets:
             "depth": self.depths,
             "circularity": self.circularity,
             "overlapping": self.overlapping.astype(np.uint8),
+            "whole_share": self.whole_shares,
         }
 
 
@@ -164,6 +169,7 @@ def measure_flat(
         depths=table[:, 5],
         circularity=table[:, 6],
         overlapping=table[:, 7] > 0,
+        whole_shares=whole_shares(table[:, 2], seen.values.shape),
         left_out=dict(left_out),
     )
 

@@ -22,11 +22,14 @@ from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import Provenance, claim_results
 from processing.runs.single_view.sources import Exposure, FlatSource
 
-COMMAND, METHOD_VERSION = "measure-single-view", 1
+COMMAND, METHOD_VERSION = "measure-single-view", 2
 
 Verdict = Literal["good", "doubtful", "empty", "refused"]
 WORST: tuple[Verdict, ...] = ("refused", "doubtful", "good", "empty")
 """Of the exposures of a shot the first one of these is that of the shot."""
+MOST_CROWDED, FEWEST_CROWDED = 0.2, 5
+"""Share of the shadows that may overlap others, or be no discs; fewer than five are chance. Of simulated sprays of 14
+to 30 px with 20 % of them D32 is 2 to 4 % wrong, with 30 to 55 % up to 9 %: two look like one, large ones are lost."""
 LEAST_MEASURED = 0.5
 """Of the droplets that are seen whole: of fewer, means are those of a choice that size and sharpness have made."""
 
@@ -92,13 +95,27 @@ def measure_source(
 
 
 def flat_statistics(shots: Sequence[StoredDroplets]) -> dict[str, Any]:
-    """Mean diameters of images or shots, in the unit of their columns: keys end with ``_px`` or ``_um``."""
+    """Mean diameters of images or shots, in the unit of their columns: keys end with ``_px`` or ``_um``.
+
+    Each droplet counts as often as its border leaves out others of its size.
+    """
     unit = "um" if any("diameter_um" in shot.columns for shot in shots) else "px"
     diameters = [np.asarray(shot.columns[f"diameter_{unit}"], np.float64) for shot in shots]
     exposures = [len(json.loads(str(shot.provenance["exposures"]))) for shot in shots]
-    sizes = mean_diameters(diameters, exposures_per_shot=sum(exposures) / max(len(exposures), 1))
+    weights = [1 / np.asarray(shot.columns["whole_share"], np.float64) for shot in shots]
+    per_shot = sum(exposures) / max(len(exposures), 1)
+    sizes = mean_diameters(diameters, exposures_per_shot=per_shot, weights_by_shot=weights)
     told = sizes.model_dump(mode="json")
     return {f"{name[:-3]}_{unit}" if name.endswith("_um") else name: value for name, value in told.items()}
+
+
+def crowded(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
+    """Why shots together are doubted, of which each may have too few shadows to say that many overlap."""
+    told = [one for shot in shots for one in json.loads(str(shot.provenance["exposures"])).values()]
+    overlapping = sum(int(np.count_nonzero(shot.columns["overlapping"])) for shot in shots)
+    clumps = sum(one["left_out"].get("not_round", 0) for one in told)
+    doubt = _crowded(overlapping, clumps, sum(one["droplets"] for one in told))
+    return (doubt,) if doubt else ()
 
 
 def droplets_twice(images: Mapping[str, StoredDroplets], um_per_px: float | None) -> tuple[str, ...]:
@@ -135,20 +152,38 @@ def _told(found: FlatDroplets | BadInput) -> dict[str, Any]:
     unmeasured = {"residual_over_noise": None}
     if isinstance(found, BadInput):
         return {"verdict": "refused", "reasons": [str(found)], "droplets": 0, "left_out": {}, **unmeasured}
-    doubt = _doubt(found)
-    verdict = "empty" if not len(found) else "doubtful" if doubt else "good"
-    told = {"reasons": [doubt] if doubt else [], "droplets": len(found), "left_out": found.left_out}
-    return {"verdict": verdict, **told, **unmeasured}
+    doubts = _doubts(found)
+    verdict = "empty" if not len(found) else "doubtful" if doubts else "good"
+    return {"verdict": verdict, "reasons": doubts, "droplets": len(found), "left_out": found.left_out, **unmeasured}
 
 
-def _doubt(found: FlatDroplets) -> str | None:
-    """Why means are not those of the spray: most of what is seen whole was not measured."""
+def _doubts(found: FlatDroplets) -> list[str]:
+    """Why means are not those of the spray."""
+    overlapping = int(np.count_nonzero(found.overlapping))
+    doubts = (_unmeasured(found), _crowded(overlapping, found.left_out.get("not_round", 0), len(found)))
+    return [doubt for doubt in doubts if doubt]
+
+
+def _unmeasured(found: FlatDroplets) -> str:
+    """Most of what is seen whole was not measured."""
     lacking = {reason: number for reason, number in found.left_out.items() if reason != "border"}
     seen = len(found) + sum(lacking.values())
     if len(found) >= LEAST_MEASURED * seen:
-        return None
+        return ""
     why = ", ".join(f"{number} {reason.replace('_', ' ')}" for reason, number in lacking.items())
     return f"{len(found)} of {seen} shadows are measured ({why}): means are of those, not of the spray"
+
+
+def _crowded(overlapping: int, clumps: int, measured: int) -> str:
+    """Shadows lie over one another: so many were told apart, and of so many clumps nobody knows what they hold."""
+    crowd, seen = overlapping + clumps, measured + clumps
+    if crowd < FEWEST_CROWDED or crowd <= MOST_CROWDED * seen:
+        return ""
+    return (
+        f"{crowd} of {seen} shadows, limit {100 * MOST_CROWDED:.0f} %, overlap others or are no discs ({clumps} are "
+        "left out, each of which may hold several droplets): two that lie over each other look like one, large ones "
+        "are lost, and means may be 10 % wrong; measure farther from the nozzle, or with less depth"
+    )
 
 
 def _columns(found: Mapping[str, FlatDroplets | BadInput], um_per_px: float | None) -> dict[str, NDArray[np.generic]]:

@@ -163,12 +163,22 @@ def _result(
     """What the images say together, of which people are told what casts doubt."""
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.runs.recipe import recipe_sha256
-    from processing.runs.single_view.measurement import COMMAND, METHOD_VERSION, droplets_twice, flat_statistics
+    from processing.runs.single_view.measurement import (
+        COMMAND,
+        METHOD_VERSION,
+        crowded,
+        droplets_twice,
+        flat_statistics,
+    )
     from processing.runs.single_view.stated_scale import scale_doubts
     from processing.runs.unchecked_images import told_unchecked, unchecked_images
 
     stored = {shot.image or f"shot {shot.shot}": read_droplets(out / shot.file) for shot in shots}
-    doubts = (*droplets_twice(stored, options.um_per_px), *scale_doubts(options.um_per_px, by_rig_um_per_px))
+    doubts = (
+        *droplets_twice(stored, options.um_per_px),
+        *crowded(list(stored.values())),
+        *scale_doubts(options.um_per_px, by_rig_um_per_px),
+    )
     unchecked_um_per_px = options.um_per_px if by_rig_um_per_px is None else None
     unchecked = unchecked_images(settings.polarity, single=True, um_per_px=unchecked_um_per_px)
     for doubt in doubts:

@@ -49,6 +49,15 @@ def test_moments_of_a_lognormal_spray_are_the_analytic_ones() -> None:
     assert statistics.relative_span.value == pytest.approx((by_volume[2] - by_volume[0]) / by_volume[1], rel=4e-3)
 
 
+def test_a_weight_is_a_number_of_droplets() -> None:
+    diameters_um, weights = np.arange(10.0, 40.0), np.tile([1, 2, 4], 10)
+    weighted = mean_diameters([diameters_um], weights_by_shot=[weights])
+    repeated = mean_diameters([np.repeat(diameters_um, weights)])
+    for name in (*MEANS, "dv50_um"):
+        assert getattr(weighted, name).value == pytest.approx(getattr(repeated, name).value), name
+    assert weighted.n == 30
+
+
 def test_three_diameters_by_hand() -> None:
     statistics = mean_diameters([[10.0] * FEWEST, [20.0, 30.0] * FEWEST])
     assert (statistics.n, statistics.shots, statistics.intervals_over) == (3 * FEWEST, 2, "shots")

@@ -87,6 +87,34 @@ def test_an_image_of_which_most_is_not_measured_is_doubtful(tmp_path: Path, caps
     assert (none["verdict"], none["reasons"][0][:32]) == ("empty", "0 of 3 shadows are measured (3 s")
 
 
+@pytest.mark.parametrize(("pairs", "crowded"), [(1, False), (4, True)])
+def test_an_image_of_shadows_that_lie_over_one_another_is_doubtful(
+    pairs: int, crowded: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Sprays were measured as *good* where four of ten shadows overlapped, and D10 was 4 to 10 % too small."""
+    alone = [(25.0 + 40 * k, 25.0 + 35 * row, 16.0) for k in range(5) for row in range(3)]
+    beside = [(x + 13, y, diameter) for x, y, diameter in alone[:pairs]]
+    cv2.imwrite(str(tmp_path / "spray.png"), grey([*alone, *beside]))
+    result = told(capsys, "measure", tmp_path / "spray.png", "-o", tmp_path / "out")
+    (shot,) = result["shots"]
+    assert (shot["verdict"] == "doubtful") is crowded
+    assert ["overlap others or are no discs" in what for what in shot["reasons"]] == [True] * crowded
+    assert ["overlap others or are no discs" in what for what in result["doubts"]] == [True] * crowded
+
+
+def test_means_know_that_the_border_cuts_large_droplets_more_often(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two of 60 px are whole and two are cut; without weights D10 was a ninth too small."""
+    cuts = [(x, y, 60.0) for x, y in ((5.0, 40.0), (105.0, 155.0))]
+    small = [(20.0 + 30 * k, 90.0 if k < 3 else 40.0, 10.0) for k in (0, 1, 4, 5, 6)]
+    cv2.imwrite(str(tmp_path / "a.png"), grey([*cuts, (80.0, 45.0, 60.0), (175.0, 100.0, 60.0), *small]))
+    statistics = told(capsys, "measure", tmp_path / "a.png", "-o", tmp_path / "out")["statistics"]
+    weights = 1 / np.array([(1 - d / SHAPE[0]) * (1 - d / SHAPE[1]) for d in (60, 10)]) * (2, 5)
+    assert statistics["n"] == 7
+    assert statistics["d10_px"]["value"] == pytest.approx(weights @ (60, 10) / weights.sum(), rel=0.01)
+
+
 def test_droplets_of_images_are_no_spray(
     images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
