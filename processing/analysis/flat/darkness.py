@@ -23,8 +23,10 @@ _GRID = 64
 
 LEAST_LIGHT = 5.0
 """Over the noise."""
-FULL_SCALES, SATURATED_SHARE = tuple(2**bits - 1 for bits in range(8, 17)), 0.01
-"""Grey values where cameras of 8 to 16 bits end; so many pixels of a background there are more than glare."""
+BITS = range(8, 17)
+FULL_SCALES, SATURATED_SHARE = {*(2**bits - 1 for bits in BITS), *((2**bits - 1) << (16 - bits) for bits in BITS)}, 0.01
+"""Grey values where cameras of 8 to 16 bits end, also where files have their bits on top; so many pixels of a
+background there are more than glare."""
 Image = NDArray[np.float32]
 
 
@@ -52,15 +54,23 @@ class Darkness:
         Where it begins in the image.
     noise : float
         Standard deviation where there is no droplet.
+    saturated : (rows, columns) bool array
+        Pixels at full scale: nobody knows how much more light it was.
     """
 
     values: Image
     first_row: int
     first_column: int
     noise: float
+    saturated: NDArray[np.bool_]
 
 
-def darkness_of(image: NDArray[np.generic], polarity: Polarity, background: NDArray[np.generic] | None) -> Darkness:
+def darkness_of(
+    image: NDArray[np.generic],
+    polarity: Polarity,
+    background: NDArray[np.generic] | None,
+    saturated: NDArray[np.bool_] | None = None,
+) -> Darkness:
     """Relative darkness of an image, without a white frame around it.
 
     Parameters
@@ -71,6 +81,8 @@ def darkness_of(image: NDArray[np.generic], polarity: Polarity, background: NDAr
         Dark droplets before light, or bright particles on black.
     background : (rows, columns) array, optional
         The light without droplets; by default a smooth one is fitted.
+    saturated : (rows, columns) bool array, optional
+        Pixels at full scale, where a dark image was taken off; by default those at the end of some camera's scale.
 
     Raises
     ------
@@ -82,26 +94,30 @@ def darkness_of(image: NDArray[np.generic], polarity: Polarity, background: NDAr
         raise LightError(ALTERNATING)
     grey = np.asarray(image, np.float32)
     rows, columns = _without_frame(grey)
-    inner = grey[rows, columns]
+    inner, full = grey[rows, columns], (_at_full_scale(grey) if saturated is None else saturated)[rows, columns]
     light = _fitted(inner) if background is None else _given(inner, np.asarray(background, np.float32)[rows, columns])
     if polarity == "bright":
         above = inner - light
         values = above / max(float(np.quantile(above, 0.9999)), 1e-6)
     else:
-        _require_light(inner)
+        _require_light(inner, full)
         values = 1 - inner / np.maximum(light, 1e-6 * max(float(light.max()), 1.0))
     some = values[::3, ::3]
     free = some[some < np.median(some) + 0.1]
     noise = 1.4826 * float(np.median(np.abs(free - np.median(free)))) if free.size else 0.0
     _require_known(values, noise, polarity, fitted=background is None)
-    return Darkness(values.astype(np.float32), rows.start or 0, columns.start or 0, noise)
+    return Darkness(values.astype(np.float32), rows.start or 0, columns.start or 0, noise, full)
+
+
+def _at_full_scale(grey: Image) -> NDArray[np.bool_]:
+    return grey == grey.max() if grey.max() in FULL_SCALES else np.zeros(grey.shape, bool)
 
 
 def _given(grey: Image, light: Image) -> Image:
     """The light that was given, if it can be that of the image."""
     if np.array_equal(grey, light):
         raise LightError("is its own background, pixel by pixel: whatever there was is divided out")
-    if light.max() in FULL_SCALES and (share := np.mean(light == light.max())) > SATURATED_SHARE:
+    if (share := np.mean(_at_full_scale(light))) > SATURATED_SHARE:
         raise LightError(
             f"has a background of which {100 * share:.0f} % are saturated: how dark droplets are is unknown"
         )
@@ -115,8 +131,8 @@ def _given(grey: Image, light: Image) -> Image:
     return light
 
 
-def _require_light(grey: Image) -> None:
-    if grey.max() in FULL_SCALES and (share := np.mean(grey == grey.max())) > SATURATED_SHARE:
+def _require_light(grey: Image, saturated: NDArray[np.bool_]) -> None:
+    if (share := np.mean(saturated)) > SATURATED_SHARE:
         raise LightError(
             f"{100 * share:.0f} % of the image are saturated: how dark droplets are is unknown, they would be too small"
         )

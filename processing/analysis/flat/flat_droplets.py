@@ -24,6 +24,8 @@ ROUNDS = 3
 """Of the light around a droplet and its outline, which depend on one another."""
 NOISES = 6.0
 """A spot must stand out by so many standard deviations of the noise of the smoothed image."""
+MOST_SATURATED = 0.05
+"""Share of the area of a bright particle; a Gaussian one whose height is clipped there is 3 % too large."""
 SMOOTHED_NOISE = 1 / 3
 """Of the noise of a pixel, in the mean of 3 x 3."""
 
@@ -72,7 +74,9 @@ class FlatDroplets:
     whole_shares : (N,) array
         Share of the image in which the centre of one as large may lie if it is seen whole.
     left_out : dict of reason to number
-        What was seen and is not among them: ``border``, ``not_round``, ``unsharp``, ``small``.
+        What was seen and is not among them: ``border``, ``not_round``, ``unsharp``, ``small``, ``saturated``.
+    image_size_px : int, int
+        Columns and rows of the image.
     """
 
     centres_px: FloatArray
@@ -84,6 +88,7 @@ class FlatDroplets:
     overlapping: NDArray[np.bool_]
     whole_shares: FloatArray
     left_out: dict[str, int]
+    image_size_px: tuple[int, int] = (0, 0)
 
     @classmethod
     def none(cls) -> "FlatDroplets":
@@ -127,7 +132,10 @@ class _Seen:
 
 
 def measure_flat(
-    image: NDArray[np.generic], settings: FlatSettings | None = None, background: NDArray[np.generic] | None = None
+    image: NDArray[np.generic],
+    settings: FlatSettings | None = None,
+    background: NDArray[np.generic] | None = None,
+    saturated: NDArray[np.bool_] | None = None,
 ) -> FlatDroplets:
     """Measure the droplets of one image.
 
@@ -139,6 +147,8 @@ def measure_flat(
         How.
     background : (rows, columns) array, optional
         The light without droplets; by default a smooth one is fitted. A white frame around the image is no light.
+    saturated : (rows, columns) bool array, optional
+        Pixels at full scale, where a dark image was taken off; by default those at the end of some camera's scale.
 
     Raises
     ------
@@ -153,7 +163,7 @@ def measure_flat(
         if np.shape(background) != np.shape(image):
             raise ValueError(f"background image {np.shape(background)} does not fit the image {np.shape(image)}")
     how = settings or FlatSettings()
-    seen = darkness_of(image, how.polarity, background)
+    seen = darkness_of(image, how.polarity, background, saturated)
     smoothed = cv2.blur(seen.values, (3, 3)).astype(np.float32)
     least = max(how.least_depth, NOISES * SMOOTHED_NOISE * seen.noise)
     spots = find_spots(smoothed, 0.5 * least, least)
@@ -171,6 +181,7 @@ def measure_flat(
         overlapping=table[:, 7] > 0,
         whole_shares=whole_shares(table[:, 2], seen.values.shape),
         left_out=dict(left_out),
+        image_size_px=(np.shape(image)[1], np.shape(image)[0]),
     )
 
 
@@ -184,6 +195,8 @@ def _measured_once(
         found = _outlined(seen.values, smoothed, spot, least)
         if isinstance(found, str):
             results.append(found)
+        elif found is not None and how.polarity == "bright" and _saturated(found.outline, seen.saturated):
+            results.append("saturated")
         elif found is not None:
             row, column = (round(coordinate) for coordinate in found.outline.centre_px)
             results += [] if (row, column) in taken else _judged(found, how)
@@ -247,6 +260,13 @@ def _light_around(smoothed: Image, outline: Outline, before: float) -> float:
     distance = np.hypot(v + top - row, u + left - column)
     ring = part[(distance >= near) & (distance <= far)]
     return float(np.median(ring)) if ring.size else before
+
+
+def _saturated(outline: Outline, saturated: NDArray[np.bool_]) -> bool:
+    """Whether so much of a particle is at full scale that its height is unknown, and so is its outline at half."""
+    (top, left), (bottom, right) = outline.points.min(axis=0), outline.points.max(axis=0)
+    within = saturated[int(top) : int(bottom) + 2, int(left) : int(right) + 2]
+    return int(np.count_nonzero(within)) > MOST_SATURATED * outline.area_px2
 
 
 def _judged(seen: _Seen, how: FlatSettings) -> list[_Measured | str]:

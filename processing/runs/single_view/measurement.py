@@ -30,6 +30,8 @@ WORST: tuple[Verdict, ...] = ("refused", "doubtful", "good", "empty")
 MOST_CROWDED, FEWEST_CROWDED = 0.2, 5
 """Share of the shadows that may overlap others, or be no discs; fewer than five are chance. Of simulated sprays of 14
 to 30 px with 20 % of them D32 is 2 to 4 % wrong, with 30 to 55 % up to 9 %: two look like one, large ones are lost."""
+MOST_SATURATED = 0.05
+"""Of the bright particles."""
 LEAST_MEASURED = 0.5
 """Of the droplets that are seen whole: of fewer, means are those of a choice that size and sharpness have made."""
 
@@ -109,6 +111,22 @@ def flat_statistics(shots: Sequence[StoredDroplets]) -> dict[str, Any]:
     return {f"{name[:-3]}_{unit}" if name.endswith("_um") else name: value for name, value in told.items()}
 
 
+def unlike_sizes(images: Mapping[str, StoredDroplets]) -> tuple[str, ...]:
+    """Why images by name have no common scale: they are not as large."""
+    first: dict[tuple[int, int], str] = {}
+    for name, image in images.items():
+        for one in json.loads(str(image.provenance["exposures"])).values():
+            if size_px := one.get("image_size_px"):
+                first.setdefault(tuple(size_px), name)
+    if len(first) < 2:
+        return ()
+    sizes = ", ".join(f"{name}: {columns} x {rows} px" for (columns, rows), name in first.items())
+    return (
+        f"images have {len(first)} sizes ({sizes}): are they of one camera, at one magnification, and is a pixel as "
+        "wide in all of them? Means are of no spray where it is not; measure those of each size by themselves",
+    )
+
+
 def crowded(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
     """Why shots together are doubted, of which each may have too few shadows to say that many overlap."""
     told = [one for shot in shots for one in json.loads(str(shot.provenance["exposures"])).values()]
@@ -141,9 +159,9 @@ def _found(source: FlatSource, settings: FlatSettings) -> Mapping[str, FlatDropl
 
 
 def _measured(exposure: Exposure, settings: FlatSettings) -> FlatDroplets | LightError:
-    image, light = exposure
+    image, light, saturated = exposure
     try:
-        return measure_flat(image, settings, light)
+        return measure_flat(image, settings, light, saturated)
     except LightError as error:
         return error
 
@@ -154,13 +172,18 @@ def _told(found: FlatDroplets | BadInput) -> dict[str, Any]:
         return {"verdict": "refused", "reasons": [str(found)], "droplets": 0, "left_out": {}, **unmeasured}
     doubts = _doubts(found)
     verdict = "empty" if not len(found) else "doubtful" if doubts else "good"
-    return {"verdict": verdict, "reasons": doubts, "droplets": len(found), "left_out": found.left_out, **unmeasured}
+    told = {"droplets": len(found), "left_out": found.left_out, "image_size_px": found.image_size_px}
+    return {"verdict": verdict, "reasons": doubts, **told, **unmeasured}
 
 
 def _doubts(found: FlatDroplets) -> list[str]:
     """Why means are not those of the spray."""
     overlapping = int(np.count_nonzero(found.overlapping))
-    doubts = (_unmeasured(found), _crowded(overlapping, found.left_out.get("not_round", 0), len(found)))
+    doubts = (
+        _unmeasured(found),
+        _saturated(found),
+        _crowded(overlapping, found.left_out.get("not_round", 0), len(found)),
+    )
     return [doubt for doubt in doubts if doubt]
 
 
@@ -172,6 +195,17 @@ def _unmeasured(found: FlatDroplets) -> str:
         return ""
     why = ", ".join(f"{number} {reason.replace('_', ' ')}" for reason, number in lacking.items())
     return f"{len(found)} of {seen} shadows are measured ({why}): means are of those, not of the spray"
+
+
+def _saturated(found: FlatDroplets) -> str:
+    """Bright particles are left out as nobody knows how bright they are: hardly the smallest ones."""
+    lacking, seen = found.left_out.get("saturated", 0), len(found) + found.left_out.get("saturated", 0)
+    if lacking <= MOST_SATURATED * seen:
+        return ""
+    return (
+        f"{lacking} of {seen} particles, limit {100 * MOST_SATURATED:.0f} %, are at the camera's full scale and not "
+        "measured: where they are half as bright is unknown, and means are of the fainter ones; take less light"
+    )
 
 
 def _crowded(overlapping: int, clumps: int, measured: int) -> str:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from daq.files.run_directory import RunReader
 from processing.calibration.calibration_file import file_sha256
 from processing.image_file import read_image
-from processing.preprocessing import Intensity
+from processing.light import FULL
+from processing.preprocessing import Frame, Intensity
 from processing.runs.errors import PipelineError
 from processing.runs.results_file import Provenance
 from processing.runs.seen_views import grey_values
@@ -20,8 +21,8 @@ from processing.runs.shots.shot_images import frame_names
 from processing.runs.workbench import read_references
 
 Grey = NDArray[np.generic]
-Exposure = tuple[Grey, Grey | None]
-"""An image less its dark image, and the light without droplets, if that is known."""
+Exposure = tuple[Grey, Grey | None, NDArray[np.bool_] | None]
+"""An image less its dark image; the light without droplets, if that is known; its pixels at full scale, likewise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +92,7 @@ def shot_sources(run: RunReader, view: str | None, shots: Sequence[int]) -> list
     """
     chosen = _view(run, view)
     references = read_references(run)[chosen]
+    most = FULL * (2 ** run.header.views[chosen].bits - 1)
 
     def exposures(index: int) -> Mapping[str, Exposure]:
         shot = run.read_shot(index)
@@ -99,6 +101,7 @@ def shot_sources(run: RunReader, view: str | None, shots: Sequence[int]) -> list
         return {
             frame: _less_dark(
                 grey_values(shot, chosen, frame),
+                most,
                 *(None if reference is None else reference["ab".index(frame)] for reference in references),
             )
             for frame in frame_names(run)
@@ -107,10 +110,11 @@ def shot_sources(run: RunReader, view: str | None, shots: Sequence[int]) -> list
     return [FlatSource(f"shot_{index:05d}", index, partial(exposures, index)) for index in shots]
 
 
-def _less_dark(grey: Grey, dark: Intensity | None, light: Intensity | None) -> Exposure:
+def _less_dark(grey: Frame, most: float, dark: Intensity | None, light: Intensity | None) -> Exposure:
+    saturated = grey > most if light is None else (grey > most) | (light > most)
     if dark is None:
-        return grey, light
-    return grey.astype(np.float32) - dark, None if light is None else light - dark
+        return grey, light, saturated
+    return grey.astype(np.float32) - dark, None if light is None else light - dark, saturated
 
 
 def _view(run: RunReader, view: str | None) -> str:
@@ -128,8 +132,8 @@ def _view(run: RunReader, view: str | None) -> str:
 def _of_image(path: Path, background: Path | None) -> Mapping[str, Exposure]:
     grey = read_image(path).astype(np.float32)
     if background is None:
-        return {"a": (grey, None)}
+        return {"a": (grey, None, None)}
     light = read_image(background).astype(np.float32)
     if light.shape != grey.shape:
         raise PipelineError(f"{background}: has shape {light.shape}, {path.name} has {grey.shape}")
-    return {"a": (grey, light)}
+    return {"a": (grey, light, None)}

@@ -233,3 +233,20 @@ def test_a_background_of_other_bits_is_refused() -> None:
 def test_light_with_a_step_is_not_known() -> None:
     with pytest.raises(LightError, match="the light is not smooth"):
         measure_flat(np.hstack([exposed(200), exposed(100)]))
+
+
+def lit(height: float, bits: int = 8) -> NDArray[np.float32]:
+    """Three blurred discs on black, as high, clipped where a camera ends; some read noise."""
+    row, column = np.mgrid[:120, :160]
+    light = sum(1 / (1 + np.exp(np.hypot(row - v, column - u) - 9)) for u, v in ((30, 30), (80, 60), (120, 90)))
+    grey = height * light + 8 + np.random.default_rng(2).normal(0, 1.5, row.shape)
+    return np.asarray(np.clip(np.rint(grey), 0, 2**bits - 1), np.float32)
+
+
+@pytest.mark.parametrize(("bits", "full", "unit"), [(8, 255, 1), (12, 4095, 1), (12, 4095, 16)])
+def test_bright_particles_at_full_scale_are_not_measured(bits: int, full: float, unit: float) -> None:
+    """Half of a height that is clipped lies too far out: at 1.5 times full scale they were 9 % larger."""
+    bright = FlatSettings(polarity="bright")
+    assert measure_flat(unit * lit(0.9 * full, bits), bright).diameters_px == pytest.approx([18, 18, 18], rel=0.02)
+    over = measure_flat(unit * lit(1.5 * full, bits), bright)
+    assert (len(over), over.left_out) == (0, {"saturated": 3})

@@ -115,6 +115,16 @@ def test_means_know_that_the_border_cuts_large_droplets_more_often(
     assert statistics["d10_px"]["value"] == pytest.approx(weights @ (60, 10) / weights.sum(), rel=0.01)
 
 
+def test_images_of_two_sizes_have_no_common_scale(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A camera that bins, or another one: pixels of the two are hardly as wide in the spray."""
+    images = [tmp_path / "one.png", tmp_path / "two.png", tmp_path / "three.png"]
+    for image, discs, part in zip(images, (DISCS, DISCS[:1], DISCS), (SHAPE[1], SHAPE[1], 200), strict=True):
+        cv2.imwrite(str(image), grey(discs)[:, :part])
+    assert told(capsys, "measure", *images[:2], "-o", tmp_path / "alike")["doubts"] == []
+    (doubt,) = told(capsys, "measure", *images, "-o", tmp_path / "out", "--um-per-px", 5)["doubts"]
+    assert doubt.startswith("images have 2 sizes (one: 220 x 160 px, three: 200 x 160 px): are they of one camera")
+
+
 def test_droplets_of_images_are_no_spray(
     images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -187,6 +197,23 @@ def test_a_run_of_one_view_is_measured_exposure_by_exposure(tmp_path: Path, caps
     stored = read_droplets(tmp_path / "out" / shot["file"])
     assert stored.columns["frame"].tolist() == ["a", "a", "b"]
     assert (stored.provenance["run"], stored.provenance["view"]) == ("single", "side")
+
+
+def test_saturated_light_is_refused_whatever_dark_image_was_taken_off(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With a dark image no pixel is at the end of a scale any more, and droplets were told too small."""
+    header = RunHeader(run_id="lit", created_utc="2026-01-01T00:00:00+00:00", views={"side": ViewFormat(SHAPE, 8)})
+    lit = np.clip(1.6 * grey(DISCS).astype(float), 0, 255).astype(np.uint8)
+    dark = np.random.default_rng(0).integers(3, 9, (2, *SHAPE)).astype(np.float32)
+    seen = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
+    with RunWriter(tmp_path / "lit", header) as writer:
+        writer.write_references({"side": dark}, {})
+        writer.write_shot(Shot(0, ImageKey.SAMPLE, {"side": DoubleFrame(lit, lit, seen, seen)}))
+        writer.finish("completed")
+    shot, *_ = told(capsys, "measure", tmp_path / "lit", "-o", tmp_path / "out", status=1)["shots"]
+    assert shot["verdict"] == "refused"
+    assert "% of the image are saturated" in shot["reasons"][0]
 
 
 @pytest.mark.parametrize(("stated", "doubted"), [(4.0, False), (4.3, False), (8.0, True), (3.5, True)])
