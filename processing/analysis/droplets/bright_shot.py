@@ -16,8 +16,10 @@ from processing.analysis.droplets.measured_exposure import MeasuredExposure, Sho
 from processing.analysis.droplets.reality import Evidence, Reality, crowding, twins_of
 from processing.analysis.droplets.verdicts.blind_views import blind_verdict, check_images
 from processing.analysis.droplets.verdicts.companions import judged_by_company
+from processing.analysis.droplets.verdicts.doubled import judged_by_copies
 from processing.analysis.droplets.verdicts.explained_images import RatioLimits, judged
 from processing.analysis.droplets.verdicts.hidden_volume import judged_by_volume
+from processing.analysis.droplets.verdicts.improbable import judged_by_probability
 from processing.analysis.droplets.verdicts.twins import ghosts_within, judged_by_twins, moved
 from processing.analysis.hidden import Hidden
 from processing.geometry import FloatArray
@@ -129,7 +131,8 @@ def _told(
     droplets = _droplets(shot, fit, residuals, search, left, noises).within(search.grid)
     hidden = Hidden.of(search.grid.shape, lambda shares: _is_seen(shot, search, search.places_at(shares)))
     found = MeasuredExposure(droplets, views, ratio, verdict, reasons, hidden=hidden)
-    return told_real(judged_by_volume(judged_by_company(found, search.grid)))
+    found = judged_by_company(judged_by_copies(found, search.grid), search.grid)
+    return told_real(judged_by_probability(judged_by_volume(found)))
 
 
 def _is_seen(shot: BlobImages, search: DropletSearch, positions_voxel: FloatArray) -> NDArray[np.bool_]:

@@ -23,6 +23,10 @@ class DropletRows(Protocol):
     """Droplets of one exposure, a row each, whatever is known of them beside their place."""
 
     @property
+    def points_mm(self) -> FloatArray:
+        """Centres (N, 3)."""
+
+    @property
     def p_real(self) -> FloatArray:
         """Probability that each is no ghost; not a number where that was not tried."""
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from processing.analysis.common_way import LEAST, common_way, ways_between
 from processing.geometry import FloatArray
 
 MOST_DROPLETS = 300
@@ -20,14 +20,12 @@ SPREAD_PX = 6.0
 """Droplets that move together differ by no more."""
 STILL_PX = 1.0
 """Dust does not move."""
-SHARE, LEAST = 0.5, 6
+SHARE = 0.5
 """So many of those that could be there twice must be."""
 LEAST_STILL = 3
 """Spots that stand still."""
 ONWARDS = np.array([0.6, 0.8])
 """Ways within an image are counted in this direction: right or down."""
-UNIQUE = 0.5
-"""Of the best agreement that any other may have: dots of a lattice agree in many ways."""
 
 Discs = tuple[FloatArray, FloatArray]
 """Centres (N, 2) and diameters (N,) in px."""
@@ -66,9 +64,7 @@ def _twice_in_image(droplets: Discs) -> str:
     """Half of the droplets of an image are the other half, moved; empty where they are not."""
     centres_px, diameters_px = _largest(droplets)
     one, other = np.triu_indices(len(diameters_px), 1)
-    ways_px = centres_px[other] - centres_px[one]
-    ways_px[ways_px @ ONWARDS < 0] *= -1
-    apart_px, count = _agreement(ways_px, diameters_px[other] / diameters_px[one])
+    apart_px, count = _agreement(ways_between(centres_px, ONWARDS), diameters_px[other] / diameters_px[one])
     if count < max(LEAST, SHARE * len(diameters_px) / 2):
         return ""
     along_px, down_px = np.abs(apart_px)
@@ -104,14 +100,4 @@ def _alike(ratios: FloatArray) -> NDArray[np.bool_]:
 
 def _agreement(steps_px: FloatArray, ratios: FloatArray) -> tuple[FloatArray, int]:
     """The way that most pairs of droplets alike have in common, and how many; 0 if other ways do nearly as well."""
-    steps_px = steps_px[_alike(ratios)]
-    if len(steps_px) < LEAST:
-        return np.zeros(2), 0
-    tree = cKDTree(steps_px)
-    counts = np.asarray(tree.query_ball_point(steps_px, SPREAD_PX, return_length=True))
-    best = int(counts.argmax())
-    near = np.hypot(*(steps_px - steps_px[best]).T) <= SPREAD_PX
-    far = np.hypot(*(steps_px - steps_px[best]).T) > 3 * SPREAD_PX
-    if far.any() and counts[far].max() > UNIQUE * counts[best]:
-        return np.zeros(2), 0
-    return np.median(steps_px[near], axis=0), int(near.sum())
+    return common_way(steps_px[_alike(ratios)], SPREAD_PX)

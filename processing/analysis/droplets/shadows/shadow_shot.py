@@ -36,8 +36,10 @@ from processing.analysis.droplets.shadows.shadow_union import union_defects
 from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.analysis.droplets.verdicts.blind_views import blind_verdict, check_images
 from processing.analysis.droplets.verdicts.cut_sizes import judged_by_smallest
+from processing.analysis.droplets.verdicts.doubled import judged_by_copies
 from processing.analysis.droplets.verdicts.elongation import judged_by_length
 from processing.analysis.droplets.verdicts.hidden_volume import judged_by_volume
+from processing.analysis.droplets.verdicts.improbable import judged_by_probability
 from processing.analysis.droplets.verdicts.twins import ghosts_within, judged_by_twins, moved
 from processing.analysis.hidden import Hidden
 from processing.kernels import DEFAULT_THREADS
@@ -99,7 +101,8 @@ def measure_shadows(
     if blind := blind_verdict(known_shadows, shot.noises_of(shot.images), search.names):
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind)
     fit = find_shadows(shot, search, light, before_round, known_light)
-    told = judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes)))
+    told = judged_by_copies(judged_by_shape(_told(shot, fit, search, sizes)), search.grid)
+    told = judged_by_probability(judged_by_volume(told))
     if told.verdict is ShotVerdict.GOOD:
         told = told.doubted(light_contradicted(shot, search, fit, light, before_round))
     told = told_real(told)
