@@ -56,7 +56,7 @@ def doubtful(stored: Stored) -> NDArray[np.int8]:
     """Which rows (N,) have a verdict that is not good: 1, else 0."""
     columns = told_columns(stored)
     verdicts = [columns[name] for name in (VERDICT, VELOCITY_VERDICT) if name in columns]
-    return np.any([~np.isin(one, BELIEVED) for one in verdicts], axis=0).astype(np.int8)
+    return np.asarray(np.any([~np.isin(one, BELIEVED) for one in verdicts], axis=0), np.int8)
 
 
 def _worst(told: Iterable[Mapping[str, Any]]) -> str:

@@ -44,7 +44,7 @@ EXPOSURES = {"a": {"verdict": "good", "reasons": []}, "b": {"verdict": "doubtful
 def file(tmp_path: Path) -> Path:
     """Five droplets in exposure A, three in B."""
     path = tmp_path / "shot_00007_droplets.h5"
-    told = {"run": "spray", "shot": 7, "exposures": json.dumps(EXPOSURES)}
+    told: dict[str, str | int | float] = {"run": "spray", "shot": 7, "exposures": json.dumps(EXPOSURES)}
     write_droplets(path, {"a": droplets(5, 1), "b": droplets(3, 2)}, told)
     return path
 
