@@ -30,7 +30,7 @@ def parse_grid(text: str, calibration: Calibration, name: str = "--grid") -> Vox
     """
     match = _FORM.fullmatch(text)
     if not match:
-        raise PipelineError(f"{name} {text!r} is not of the form X0:X1,Y0:Y1,Z0:Z1[@PITCH] in mm")
+        raise PipelineError(f"{name} {text!r} is not of the form X0:X1,Y0:Y1,Z0:Z1[@PITCH] in mm, as -2:2,-1:1.5,-1:1")
     *bounds_mm, pitch = match.groups()
     lower_mm, upper_mm = np.array(bounds_mm, dtype=float).reshape(3, 2).T
     pitch_mm = float(pitch) if pitch else default_grid(calibration).pitch_mm

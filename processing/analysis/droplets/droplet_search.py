@@ -11,6 +11,7 @@ from processing.analysis.droplets.sight_lattice import SightLattice, sight_latti
 from processing.geometry import FloatArray, ViewMapping
 from processing.kernels import _native
 from processing.reconstruction.errors import ReconstructionError
+from processing.reconstruction.planning.common_volume import scale_px_per_mm
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.volume import VoxelGrid
 
@@ -144,13 +145,9 @@ def plan_droplets(
         Too few or too many views, images that are too small, voxels much wider or narrower than pixels, or a mapping
         that is too rough to be sampled.
     """
+    _require_fine(mappings, grid)
     searched = _widened(grid, margin_voxel)
     lattice = sight_lattice(mappings, searched)
-    if not LEAST_PX_PER_VOXEL <= lattice.pixels_per_voxel <= MOST_PX_PER_VOXEL:
-        raise ReconstructionError(
-            f"a voxel of {grid.pitch_mm:.4g} mm is {lattice.pixels_per_voxel:.3g} px wide: droplets are looked for "
-            f"with {LEAST_PX_PER_VOXEL} to {MOST_PX_PER_VOXEL} px per voxel"
-        )
     plan = plan_reconstruction(mappings, _coarser(searched), names=names)
     for name, mapping in zip(plan.names, mappings, strict=True):
         if min(mapping.image_size_px) < _native.MAX_BLOB_WINDOW_PX:
@@ -160,6 +157,19 @@ def plan_droplets(
                 f"{_native.MAX_BLOB_WINDOW_PX} px at least on each side"
             )
     return DropletSearch(grid, searched, lattice, plan, plan.names)
+
+
+def _require_fine(mappings: Sequence[ViewMapping], grid: VoxelGrid) -> None:
+    """Refuse voxels that are much wider or narrower than pixels, and say which are not."""
+    middle_mm = grid.to_mm((np.array([grid.shape]) - 1) / 2)[0]
+    px_per_mm = float(np.mean([scale_px_per_mm(mapping, middle_mm) for mapping in mappings]))
+    if not LEAST_PX_PER_VOXEL <= (width_px := grid.pitch_mm * px_per_mm) <= MOST_PX_PER_VOXEL:
+        least_mm, most_mm = LEAST_PX_PER_VOXEL / px_per_mm, MOST_PX_PER_VOXEL / px_per_mm
+        raise ReconstructionError(
+            f"a voxel of {grid.pitch_mm:.4g} mm is {width_px:.3g} px wide: droplets are looked for with "
+            f"{LEAST_PX_PER_VOXEL} to {MOST_PX_PER_VOXEL} px per voxel; leave the pitch out of the grid, or state one "
+            f"from {least_mm:.2g} to {most_mm:.2g} mm"
+        )
 
 
 def _widened(grid: VoxelGrid, margin_voxel: int) -> VoxelGrid:

@@ -15,6 +15,9 @@ from processing.volume import VoxelGrid
 
 MAX_DEVIATION_PX = 0.01
 """What the lattice may add to the position of a droplet, which is measured to 0.02 px."""
+HOPELESS_PX = 100.0
+"""A mapping that bends by so much between the nodes farthest apart bends by more than the limit between the nearest
+ones, too: a grid that reaches far beyond what was calibrated is not sampled in vain."""
 APART_DEG = 9.0
 """Views along lines that are nearer than that, or that look at each other, tell nearly the same: of 120 droplets, four
 views 5 degrees apart make 126, 8 degrees 122, 10 degrees no more than there are."""
@@ -110,7 +113,9 @@ def sight_lattice(mappings: Sequence[ViewMapping], grid: VoxelGrid) -> SightLatt
         )
         if deviation_px <= MAX_DEVIATION_PX:
             return SightLattice(np.ascontiguousarray(nodes_px, dtype=np.float64), spacing, deviation_px)
+        if deviation_px > HOPELESS_PX:
+            break
     raise RoughMapping(
-        f"a mapping bends by {deviation_px:.3g} px within {_native.NODE_SPACINGS[-1]} voxels, limit "
+        f"a mapping bends by {deviation_px:.3g} px within {spacing} voxels, limit "
         f"{MAX_DEVIATION_PX} px: droplets cannot be measured; does the grid reach beyond what was calibrated?"
     )

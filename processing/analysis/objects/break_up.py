@@ -79,6 +79,7 @@ class Reach:
     voxel_mm: float = 0.0
     reason: str | None = None
     apart_mm: tuple[float, float] | None = None
+    behind_mm: float = 0.0
 
 
 def reach_of(voxels: DarkVoxels, nozzle: Nozzle) -> Reach:
@@ -97,7 +98,8 @@ def reach_of(voxels: DarkVoxels, nozzle: Nozzle) -> Reach:
     if (aside := _goes_aside(main, nozzle)) is not None:
         return Reach(reason=aside)
     reach_mm, leaves = zip(*(_reach(body, nozzle) for body in judged), strict=True)
-    return Reach(THRESHOLDS, reach_mm, leaves, main.grid.pitch_mm)
+    behind_mm = max(-float(nozzle.along_mm(main.points_mm).min()), 0.0)
+    return Reach(THRESHOLDS, reach_mm, leaves, main.grid.pitch_mm, behind_mm=behind_mm)
 
 
 def _goes_aside(body: DarkVoxels, nozzle: Nozzle) -> str | None:
@@ -141,12 +143,12 @@ def _bodies(body: DarkVoxels, nozzle: Nozzle) -> Iterator[DarkVoxels]:
 
 
 def _reach(body: DarkVoxels, nozzle: Nozzle) -> tuple[float, bool]:
-    """Length along the axis, and whether it leaves the grid farther from the nozzle than liquid begins."""
+    """Length along the axis, and whether it leaves the grid before the nozzle, farther from it than liquid begins."""
     if not len(body):
         return 0.0, False
-    points_mm = body.points_mm
-    leaves = at_faces(body) & (nozzle.distances_mm(points_mm) > 2 * NEAR_MM)
-    return float(nozzle.along_mm(points_mm).max()) + body.grid.pitch_mm / 2, bool(leaves.any())
+    points_mm, along_mm = body.points_mm, nozzle.along_mm(body.points_mm)
+    leaves = at_faces(body) & (nozzle.distances_mm(points_mm) > 2 * NEAR_MM) & (along_mm > 0)
+    return float(along_mm.max()) + body.grid.pitch_mm / 2, bool(leaves.any())
 
 
 def _half(voxels: DarkVoxels) -> FloatArray:

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.objects.break_up import TELLING, Reach
+from processing.analysis.objects.break_up import NEAR_MM, TELLING, Reach
+from processing.count import counted
 from processing.geometry import FloatArray
 
 DRAWS, LIMITS_PERCENT = 1000, (2.5, 97.5)
@@ -71,8 +72,8 @@ def break_up_of(shots: Sequence[Reach], seed: int = 0) -> BreakUp:
     reasons = "; ".join(dict.fromkeys(shot.reason for shot in shots if shot.reason))
     if not known:
         return BreakUp(reason=reasons or "no shot was measured")
-    unknown = f"not known of {len(shots) - len(known)} of {len(shots)} shots: {reasons}" if reasons else None
-    doubts = "; ".join(filter(None, (_apart(known), unknown))) or None
+    unknown = f"not known of {len(shots) - len(known)} of {counted(len(shots), 'shot')}: {reasons}" if reasons else None
+    doubts = "; ".join(filter(None, (_apart(known), _behind(known), unknown))) or None
     reach_mm, leaves = _table(known)
     value_mm = _half_connected_mm(reach_mm.ravel(), leaves.ravel())
     drawn_mm = np.sort([_half_connected_mm(*draw) for draw in _draws(known, seed)])
@@ -114,9 +115,21 @@ def _apart(shots: Sequence[Reach]) -> str | None:
         return None
     first_mm, last_mm = np.median(spans_mm, axis=0)
     return (
-        f"in {len(spans_mm)} of {len(shots)} shots a large body, {first_mm:.2f} to {last_mm:.2f} mm from the nozzle "
-        "along the axis, does not hang together with it: torn off, joined by film too thin to be seen, or is the "
-        "nozzle stated wrongly?"
+        f"in {len(spans_mm)} of {counted(len(shots), 'shot')} a large body, {first_mm:.2f} to {last_mm:.2f} mm from "
+        "the nozzle along the axis, does not hang together with it: torn off, joined by film too thin to be seen, or "
+        "is the nozzle stated wrongly?"
+    )
+
+
+def _behind(shots: Sequence[Reach]) -> str | None:
+    """In how many shots liquid begins before the nozzle does."""
+    behind_mm = [shot.behind_mm for shot in shots if shot.behind_mm > NEAR_MM]
+    if not behind_mm:
+        return None
+    return (
+        f"in {len(behind_mm)} of {counted(len(shots), 'shot')} what hangs together goes {np.median(behind_mm):.2f} mm "
+        "behind the nozzle, and the length is told from there, where it is stated: is that its place? If it is the "
+        "nozzle that is seen, leave its pixels unasked (--ignore)"
     )
 
 

@@ -1,6 +1,5 @@
 """Liquid that is no droplet, in recorded shots of shadows: looked for in all that the views see in common."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any
@@ -18,6 +17,7 @@ from processing.analysis.objects.object_search import ObjectSearch, measure_obje
 from processing.analysis.objects.object_sizes import MedianSizes, median_sizes
 from processing.analysis.objects.object_velocities import MovingObjects, object_velocities
 from processing.analysis.objects.told_droplets import without_told
+from processing.analysis.stored_json import stored_json
 from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
@@ -178,11 +178,17 @@ class LiquidSummary(FrozenValue):
 
 
 NO_OBJECTS = "nobody looked for it: bright particles, or a file of an older program"
+NOT_MEASURED = {
+    "empty": "exposures are empty: no view sees any liquid",
+    "refused": "exposures are refused",
+}
+"""Why there is no length, by the verdicts of all exposures."""
 
 
 def liquid_summary(shots: Sequence[StoredDroplets]) -> LiquidSummary:
     """Objects of some shots by their files; the break-up length is of the first exposure of each."""
-    return summary_of(objects_of(shots), sum(len(told_of_exposures(shot)) for shot in shots), reaches_of(shots))
+    exposures = sum(len(told_of_exposures(shot)) for shot in shots)
+    return summary_of(objects_of(shots), exposures, reaches_of(shots), _why_none(shots))
 
 
 def objects_of(shots: Sequence[StoredDroplets]) -> list[LiquidObjects]:
@@ -190,13 +196,23 @@ def objects_of(shots: Sequence[StoredDroplets]) -> list[LiquidObjects]:
     return [LiquidObjects.of(shot.objects) for shot in shots if told_of_exposures(shot)]
 
 
-def summary_of(by_shot: Sequence[LiquidObjects], exposures: int, reaches: Sequence[Reach]) -> LiquidSummary:
+def _why_none(shots: Sequence[StoredDroplets]) -> str:
+    """Why nothing is told of liquid that is no droplet, where nothing is."""
+    exposures = [one for shot in shots for one in stored_json(shot.provenance, "exposures").values()]
+    verdicts = {str(one.get("verdict")) for one in exposures if "objects" not in one}
+    told = [text for verdict, text in NOT_MEASURED.items() if verdict in verdicts]
+    return " or ".join(told) if told and verdicts <= NOT_MEASURED.keys() else NO_OBJECTS
+
+
+def summary_of(
+    by_shot: Sequence[LiquidObjects], exposures: int, reaches: Sequence[Reach], why_none: str = NO_OBJECTS
+) -> LiquidSummary:
     """Objects of some shots by their classes, in so many exposures, and the break-up length of one exposure each."""
     counts = {f"{kind}s": sum(one.count(kind) for one in by_shot) for kind in COUNTED}
     medians = median_sizes(by_shot, ObjectClass.LIGAMENT, exposures)
     counted = LiquidSummary.model_validate({**counts, "ligament_medians": medians})
     if not reaches:
-        return counted.model_copy(update={"break_up_reason": NO_OBJECTS})
+        return counted.model_copy(update={"break_up_reason": why_none})
     found = break_up_of(reaches)
     value = None
     if found.value_mm is not None and found.low_mm is not None:
@@ -218,7 +234,7 @@ def reaches_of(shots: Sequence[StoredDroplets]) -> list[Reach]:
 
 def told_of_exposures(shot: StoredDroplets) -> list[Mapping[str, Any]]:
     """What the file of a shot says of liquid that is no droplet, exposure by exposure."""
-    exposures = json.loads(str(shot.provenance.get("exposures", "{}"))).values()
+    exposures = stored_json(shot.provenance, "exposures").values()
     return [exposure["objects"] for exposure in exposures if exposure.get("objects")]
 
 

@@ -16,7 +16,8 @@ from processing.analysis.droplets.verdicts.twins import judged_by_twins
 from processing.analysis.estimates import Estimate
 from processing.analysis.hidden import Hidden
 from processing.geometry import FloatArray
-from processing.reconstruction.errors import ReconstructionError
+from processing.kernels import _native
+from processing.reconstruction.errors import ReconstructionError, RoughMapping
 from processing.studies.droplets import BrightScene, DropletCase
 from processing.volume import VoxelGrid
 from tests.support.bright_scenes import GRID, MARGIN_VOXEL, scene, search_of
@@ -281,8 +282,20 @@ def test_bad_images_are_named(truth: BrightScene) -> None:
 
 def test_voxels_must_be_about_as_wide_as_pixels(truth: BrightScene) -> None:
     coarse = VoxelGrid((20, 12, 40), GRID.origin_mm, 4 * GRID.pitch_mm)
-    with pytest.raises(ReconstructionError, match=r"px wide: droplets are looked for with 0\.4 to 1\.3 px per voxel"):
+    asked = (
+        r"px wide: droplets are looked for with 0\.4 to 1\.3 px per voxel; leave the pitch out of the grid, or state"
+    )
+    with pytest.raises(ReconstructionError, match=asked):
         plan_droplets(truth.believed, coarse, margin_voxel=MARGIN_VOXEL)
+    with pytest.raises(ReconstructionError, match=asked):
+        plan_droplets(truth.believed, VoxelGrid((2, 2, 2), GRID.origin_mm, 300 * GRID.pitch_mm))
+
+
+def test_a_grid_far_beyond_what_was_calibrated_is_not_sampled_in_vain(truth: BrightScene) -> None:
+    """Nodes that are nearer to each other took minutes and gigabytes."""
+    deep = VoxelGrid((60_000, 9, 9), (0.0, 0.0, -30_000 * GRID.pitch_mm), GRID.pitch_mm)
+    with pytest.raises(RoughMapping, match=f"px within {_native.NODE_SPACINGS[0]} voxels"):
+        plan_droplets(truth.believed, deep, margin_voxel=MARGIN_VOXEL)
 
 
 def test_where_droplets_do_not_explain_the_images_nobody_is_sent_to_calibrate_again() -> None:

@@ -46,6 +46,22 @@ def test_what_leaves_the_field_is_longer_than_told() -> None:
     assert "longer than 7.05 mm" in (found.reason or "")
 
 
+def test_liquid_that_leaves_the_field_behind_the_nozzle_ends_before_it() -> None:
+    """The nozzle is stated downstream of where it is, or is seen itself: nothing leaves along the axis."""
+    reach = reach_of(_column(-4.0, 1.0), Nozzle((0.0, -2.5, 0.0)))
+    assert reach.open == (False,) * 4
+    found = break_up_of([reach])
+    assert found.value_mm == pytest.approx(3.55)
+    assert "in 1 of 1 shot what hangs together goes 1.50 mm behind the nozzle" in (found.reason or "")
+
+
+@pytest.mark.parametrize("first_mm", [-3.2, -3.0, -2.8])
+def test_liquid_that_begins_about_the_nozzle_is_not_behind_it(first_mm: float) -> None:
+    found = break_up_of([reach_of(_column(first_mm, 1.0), NOZZLE)])
+    assert found.value_mm == pytest.approx(4.05)
+    assert found.reason is None
+
+
 @pytest.mark.parametrize(
     ("voxels", "nozzle", "reason"),
     [

@@ -66,3 +66,19 @@ def test_what_is_not_known_is_null_with_its_reason() -> None:
     assert liquid_summary([_shot(Reach(reason="no nozzle"))]).break_up_reason == "no nozzle"
     old = StoredDroplets({"frame": np.empty(0, "U1")}, {"exposures": json.dumps({"a": {"verdict": "good"}})})
     assert liquid_summary([old]).break_up_reason == NO_OBJECTS
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "reason"),
+    [
+        ("empty", "exposures are empty: no view sees any liquid"),
+        ("refused", "exposures are refused"),
+        ("empty refused", "exposures are empty: no view sees any liquid or exposures are refused"),
+        ("empty good", NO_OBJECTS),
+        ("", NO_OBJECTS),
+    ],
+)
+def test_a_length_of_nothing_is_not_said_to_be_unasked(verdicts: str, reason: str) -> None:
+    told = [{"exposures": json.dumps({"a": {"verdict": verdict}})} for verdict in verdicts.split()]
+    shots = [StoredDroplets({"frame": np.empty(0, "U1")}, {**one}) for one in told]
+    assert liquid_summary(shots).break_up_reason == reason
