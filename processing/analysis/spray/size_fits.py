@@ -36,7 +36,12 @@ class SizeFit(FrozenValue):
     scale_um: Annotated[float, Field(description="lognormal: median by volume; Rosin-Rammler: X, 63.2 % is smaller")]
     shape: Annotated[float, Field(description="lognormal: standard deviation of ln d; Rosin-Rammler: exponent q")]
     scale_within_um: Annotated[Estimate | None, Field(description="the same with its 95 % interval over shots")] = None
-    shape_within: Annotated[Estimate | None, Field(description="likewise")] = None
+    shape_within: Annotated[
+        Estimate | None,
+        Field(
+            description="likewise; of a lognormal it holds the truth in less than 95 %, and lies too low: see sample"
+        ),
+    ] = None
     d32_um: Annotated[float | None, Field(description="Sauter's mean that it has; null where it has none: q up to 1")]
     dv50_um: Annotated[float, Field(description="median by volume that it has")]
     largest_gap: Annotated[float, Field(description="between its cumulative volume and the measured one, 0 to 1")]
