@@ -4,7 +4,6 @@ Of shots with more droplets each has been asked by itself: whether they look lik
 as the very same ones of A. Of all it is asked whether they are a little longer than wide, and how many are missing.
 """
 
-import json
 import math
 from collections import defaultdict
 from collections.abc import Sequence
@@ -17,6 +16,7 @@ from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS
 from processing.analysis.droplets.shadows.shadow_light import unlike_discs
 from processing.analysis.droplets.verdicts.cut_sizes import complete_from_um, cut_off
 from processing.analysis.droplets.verdicts.elongation import WRONG, Elongation, elongation_told
+from processing.analysis.stored_json import stored_json
 from processing.analysis.unlike_sizes import FEWEST, LEAST_P_PAIR, LONGEST_NS, common_share, unlike_told
 from processing.geometry import FloatArray
 
@@ -42,14 +42,14 @@ def _smallest(shots: Sequence[StoredDroplets]) -> str:
 
 def _limit_um(shot: StoredDroplets) -> float:
     """From where on the droplets of its exposure A are found; 0 where its file does not tell."""
-    views = json.loads(str(shot.provenance.get("exposures", "{}"))).get("a", {}).get("views", {})
+    views = stored_json(shot.provenance, "exposures").get("a", {}).get("views", {})
     return complete_from_um([view.get("complete_from_um", 0.0) for view in views.values()])
 
 
 def _views(shots: Sequence[StoredDroplets]) -> list[Elongation]:
     """How long shadows are, by view, of all exposures that are not refused; files of older programs do not tell."""
     told = defaultdict(list)
-    exposures = (one for shot in shots for one in json.loads(str(shot.provenance.get("exposures", "{}"))).values())
+    exposures = (one for shot in shots for one in stored_json(shot.provenance, "exposures").values())
     for exposure in (one for one in exposures if one.get("verdict") != REFUSED):
         for name, view in exposure.get("views", {}).items():
             if longer := view.get("elongation"):
@@ -89,5 +89,5 @@ def _pairs(shot: StoredDroplets) -> FloatArray:
 
 
 def _separation_ns(shot: StoredDroplets) -> float | None:
-    told = json.loads(str(shot.provenance.get("velocity", "{}")))
+    told = stored_json(shot.provenance, "velocity")
     return None if (stated := told.get("separation_ns")) is None else float(stated)

@@ -3,13 +3,13 @@
 Shots of few droplets tell it together.
 """
 
-import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.stored_json import stored_json
 
 CLOSE_PX = 0.25
 """Root mean square, over views, of how far lines of sight may pass a droplet that they are said to meet at."""
@@ -42,7 +42,7 @@ def depth_known(counts: Mapping[str, int]) -> bool:
 
 def sights_of(shots: Sequence[StoredDroplets]) -> dict[str, int]:
     """Counts of all shots together; of those from before, none."""
-    return added(json.loads(str(shot.provenance.get(SIGHTS, "{}"))) for shot in shots)
+    return added(stored_json(shot.provenance, SIGHTS) for shot in shots)
 
 
 def added(several: Iterable[Mapping[str, int]]) -> dict[str, int]:

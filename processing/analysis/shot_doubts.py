@@ -1,6 +1,5 @@
 """What some shots say of all that is made of them: how many are doubtful or refused, how many fly another way."""
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from processing.analysis.alone_droplets import alone_in_shots
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.stored_json import stored_json
 from processing.analysis.unlike_numbers import unlike_numbers_of_shots
 from processing.geometry import FloatArray
 
@@ -24,7 +24,7 @@ UNSURE = {"doubtful": "are doubtful, and count", "refused": "are refused, and do
 
 def exposure_doubts(shots: Sequence[StoredDroplets], frames: str = "ab") -> tuple[str, ...]:
     """Doubts on the exposures of some frames."""
-    told = [json.loads(str(shot.provenance.get("exposures", "{}"))) for shot in shots]
+    told = [stored_json(shot.provenance, "exposures") for shot in shots]
     exposures = [exposure for shot in told for frame, exposure in shot.items() if frame in frames]
     unsure = tuple(f"{count} exposures {why}" for count, why in _unsure(exposures))
     numbers = unlike_numbers_of_shots(shots) if set(frames) >= {"a", "b"} else ""
@@ -33,7 +33,7 @@ def exposure_doubts(shots: Sequence[StoredDroplets], frames: str = "ab") -> tupl
 
 def velocity_doubts(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
     """Doubts on the velocities; none where nobody could measure any."""
-    velocities = [json.loads(str(shot.provenance.get("velocity", "{}"))) for shot in shots]
+    velocities = [stored_json(shot.provenance, "velocity") for shot in shots]
     flying = [(shot, rows) for shot in shots if (rows := _flying(shot)) is not None]
     unsure = (f"velocities of {count} shots {why}" for count, why in _unsure(velocities))
     return (*unsure, *alone_in_shots(shots).told, *_against(flying), *_faster(flying))

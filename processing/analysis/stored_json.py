@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 
-def stored_json(provenance: Mapping[str, object], name: str) -> dict[str, Any]:
+def stored_json(provenance: Mapping[str, object], name: str) -> Any:
     """A table by its name, of a file's provenance; empty where the file keeps none, or null.
 
     Parameters
@@ -15,5 +15,4 @@ def stored_json(provenance: Mapping[str, object], name: str) -> dict[str, Any]:
     name : str
         ``exposures``, ``velocity``, ``settings``, ``notes``, ``spray``, ...
     """
-    table: dict[str, Any] | None = json.loads(str(provenance.get(name, "{}")))
-    return table or {}
+    return json.loads(str(provenance.get(name, "{}"))) or {}

@@ -4,7 +4,6 @@ Densities and means are of both exposures together, and nothing else tells where
 spray: an exposure without droplets is a good one of an empty box.
 """
 
-import json
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,6 +11,7 @@ from scipy.special import bdtr
 
 from processing.analysis.droplets.droplet_file import FRAME, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import REFUSED
+from processing.analysis.stored_json import stored_json
 
 MOST_RATIO, MOST_RATIO_OF_SHOTS = 1.5, 1.1
 """Of the larger number to the smaller one, of one shot, and of all shots together."""
@@ -44,7 +44,7 @@ def unlike_numbers_of_shots(shots: Sequence[StoredDroplets]) -> str:
     numbers = [
         int(np.count_nonzero(shot.columns[FRAME].astype("U1") == frame))
         for shot in shots
-        for told in [json.loads(str(shot.provenance.get("exposures", "{}")))]
+        for told in [stored_json(shot.provenance, "exposures")]
         if {"a", "b"} <= told.keys() and all(one.get("verdict") != REFUSED for one in told.values())
         for frame in "ab"
     ]

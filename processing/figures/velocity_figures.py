@@ -1,6 +1,5 @@
 """Figures of velocities: droplets of a shot with theirs, and how well a study paired them."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.stored_json import stored_json
 from processing.figures.droplet_figures import draw_case
 from processing.figures.spacing import rounded_down
 
@@ -98,7 +98,7 @@ def _draw_panel(
 
 def _reasons(shot: StoredDroplets) -> str:
     """Why a file has no velocities, as it says itself; empty where it does not."""
-    told = json.loads(str(shot.provenance.get("velocity", "{}")))
+    told = stored_json(shot.provenance, "velocity")
     return str(told.get("reason") or "; ".join(told.get("reasons", ())))
 
 

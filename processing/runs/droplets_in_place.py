@@ -1,6 +1,5 @@
 """Files of droplets under the name of their shot and in the folder of their run: one that was moved is refused."""
 
-import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 from processing.analysis.droplets.droplet_file import REMEDY, DropletFileError, StoredDroplets, read_droplets
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL
 from processing.analysis.seal import SEAL
+from processing.analysis.stored_json import stored_json
 from processing.reconstruction.settings import GridSettings
 from processing.runs.run_around import of_another_run
 
@@ -48,7 +48,7 @@ def _require_in_box(path: Path, stored: StoredDroplets) -> None:
     if said is None or "x_mm" not in stored.columns:
         return
     grid = GridSettings.model_validate_json(str(said)).to_grid()
-    settings = json.loads(str(stored.provenance.get("settings", "{}")))
+    settings = stored_json(stored.provenance, "settings")
     margin_mm = (1 + settings.get("margin_voxel", MARGIN_VOXEL)) * grid.pitch_mm
     for name, span_mm in (("x_mm", grid.x_mm), ("y_mm", grid.y_mm), ("z_mm", grid.z_mm)):
         places = np.asarray(stored.columns[name], np.float64)

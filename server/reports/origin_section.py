@@ -8,6 +8,7 @@ from typing import Any
 from processing.analysis.droplets.droplet_statistics import measured_grid
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
+from processing.analysis.stored_json import stored_json
 from processing.runs.sprays.measured_spray import MeasuredSpray
 from server.reports.page import Section, Table
 
@@ -16,7 +17,7 @@ WITH_UNIT = {"pressure_bar": "pressure [bar]"}
 
 def origin_of(spray: MeasuredSpray, axis: SprayAxis | None, sample: SpraySample | None) -> Section:
     """All that, of droplets in a sample."""
-    settings = json.loads(str(spray.provenance.get("settings", "{}")))
+    settings = stored_json(spray.provenance, "settings")
     recipes = "; ".join(f"SHA-256 {one[:16]}..." for one in _stated(spray, "recipe_sha256")) or "not stated"
     sha256 = _stated(spray, "calibration_sha256")
     rows = [

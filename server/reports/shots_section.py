@@ -1,6 +1,5 @@
 """The chapter on the shots: exposure by exposure how well it was explained, how many droplets are ghosts, and why."""
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -10,6 +9,7 @@ from processing.analysis.droplets.droplet_file import DIAMETER, FRAME, StoredDro
 from processing.analysis.droplets.droplet_statistics import P_REAL
 from processing.analysis.droplets.ghost_share import told_share
 from processing.analysis.estimates import Estimate
+from processing.analysis.stored_json import stored_json
 from processing.figures.shots_figure import JudgedExposure, shots_figure
 from server.reports.page import Picture, Section, Table
 
@@ -38,7 +38,7 @@ def exposure_rows(shots: Sequence[StoredDroplets]) -> list[list[str]]:
 
 
 def _told(shot: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    told: dict[str, Mapping[str, Any]] = json.loads(str(shot.get("exposures", "{}")))
+    told: dict[str, Mapping[str, Any]] = stored_json(shot, "exposures")
     return told
 
 

@@ -1,6 +1,5 @@
 """What the droplets of some shots say of a spray, as their files have them."""
 
-import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any
@@ -13,6 +12,7 @@ from processing.analysis.droplets.ghost_share import BESIDE_LIQUID, MANY_OBJECTS
 from processing.analysis.droplets.size_statistics import SizeStatistics, mean_diameters, shots_density
 from processing.analysis.droplets.sizes_in_light import in_its_light
 from processing.analysis.estimates import Estimate
+from processing.analysis.stored_json import stored_json
 from processing.reconstruction.settings import GridSettings
 from processing.volume import VoxelGrid
 
@@ -116,7 +116,7 @@ def _require_alike(shots: Sequence[StoredDroplets]) -> None:
 
 def _made_by(shot: StoredDroplets) -> dict[str, object]:
     """Version, calibration and settings of a measurement, less those that leave a droplet what it is."""
-    settings = json.loads(str(shot.provenance.get("settings", "{}")))
+    settings = stored_json(shot.provenance, "settings")
     version, calibration = shot.provenance.get("method_version", 1), shot.provenance.get("calibration")
     made_by = {"method_version": version, "calibration": calibration}
     return {**made_by, **{name: one for name, one in settings.items() if name not in _SAME_DROPLETS}}
@@ -134,7 +134,7 @@ def told_exposures(shot: StoredDroplets) -> list[Mapping[str, Any]]:
     """What was told of the exposures that are not refused."""
     if "exposures" not in shot.provenance:
         raise DropletFileError(f"{shot.name}: its file does not say what became of its exposures")
-    exposures = json.loads(str(shot.provenance["exposures"])).values()
+    exposures = stored_json(shot.provenance, "exposures").values()
     return [exposure for exposure in exposures if exposure["verdict"] != REFUSED]
 
 
@@ -186,9 +186,7 @@ def measured_mm3(shot: StoredDroplets, exposures: Sequence[Mapping[str, Any]]) -
 
 def measured_grid(shot: StoredDroplets) -> VoxelGrid | None:
     """Where droplets are told; files that do not state it have it in their settings, if the user named a grid."""
-    grid = json.loads(str(shot.provenance.get("grid", "null"))) or json.loads(str(shot.provenance["settings"])).get(
-        "grid"
-    )
+    grid = stored_json(shot.provenance, "grid") or stored_json(shot.provenance, "settings").get("grid")
     return GridSettings.model_validate(grid).to_grid() if grid else None
 
 
@@ -206,7 +204,7 @@ def _ghost_share(shots: Sequence[StoredDroplets], per_shot: float) -> Estimate |
 
 def _beside_liquid(shot: StoredDroplets) -> bool:
     """Whether that is why nothing says how probably the droplets of any exposure are real."""
-    exposures = json.loads(str(shot.provenance["exposures"]))
+    exposures = stored_json(shot.provenance, "exposures")
     return all(
         exposure["verdict"] == GOOD
         and exposure.get("hidden", {}).get("liquid_objects", 0)

@@ -3,7 +3,6 @@
 A figure is no better than the shots that it comes from. Each of these is told beside the figures, wherever they go.
 """
 
-import json
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
@@ -23,6 +22,7 @@ from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_motion import FEWEST, all_alike
 from processing.analysis.spray.spray_sample import SpraySample, box_told
 from processing.analysis.spray.steadiness import changes_of_spray
+from processing.analysis.stored_json import stored_json
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
 from processing.geometry import FloatArray
 
@@ -79,7 +79,7 @@ def spray_doubts(
 
 def noted(shots: Sequence[StoredDroplets]) -> dict[str, str]:
     """What the operator has written down of some shots, by name; several values where shots differ."""
-    notes = [json.loads(str(shot.provenance.get("notes", "{}"))) for shot in shots]
+    notes = [stored_json(shot.provenance, "notes") for shot in shots]
     stated = [{**one, **one.get("more", {})} for one in notes]
     names = dict.fromkeys(name for one in stated for name in one if name not in NO_CONDITIONS)
     return {name: " and ".join(dict.fromkeys(str(one.get(name, NOT_STATED)) for one in stated)) for name in names}
@@ -179,7 +179,7 @@ def _as_next_to(means: FloatArray) -> FloatArray:
 
 def _of_pressure(shots: Sequence[StoredDroplets], sample: SpraySample) -> Iterator[str]:
     """Whether droplets fly faster than the pressure that is noted makes any liquid leave a nozzle (Bernoulli)."""
-    notes = [json.loads(str(shot.provenance.get("notes", "{}"))) for shot in shots]
+    notes = [stored_json(shot.provenance, "notes") for shot in shots]
     stated_bar = [one.get("pressure_bar") for one in notes]
     speeds_m_s = np.linalg.norm(sample.velocities_m_s[sample.paired], axis=1)
     if None in stated_bar or not max(stated_bar, default=0) or len(speeds_m_s) < FEWEST:

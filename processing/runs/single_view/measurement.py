@@ -15,6 +15,7 @@ from processing.analysis.droplets.size_statistics import mean_diameters
 from processing.analysis.flat.darkness import LightError
 from processing.analysis.flat.flat_droplets import FlatDroplets, FlatSettings, measure_flat
 from processing.analysis.flat.repeated import Discs, counted_twice
+from processing.analysis.stored_json import stored_json
 from processing.errors import BadInput
 from processing.image_file import ImageFileError
 from processing.reconstruction.settings import FrozenValue
@@ -103,7 +104,7 @@ def flat_statistics(shots: Sequence[StoredDroplets]) -> dict[str, Any]:
     """
     unit = "um" if any("diameter_um" in shot.columns for shot in shots) else "px"
     diameters = [np.asarray(shot.columns[f"diameter_{unit}"], np.float64) for shot in shots]
-    exposures = [len(json.loads(str(shot.provenance["exposures"]))) for shot in shots]
+    exposures = [len(stored_json(shot.provenance, "exposures")) for shot in shots]
     weights = [1 / np.asarray(shot.columns["whole_share"], np.float64) for shot in shots]
     per_shot = sum(exposures) / max(len(exposures), 1)
     sizes = mean_diameters(diameters, exposures_per_shot=per_shot, weights_by_shot=weights)
@@ -115,7 +116,7 @@ def unlike_sizes(images: Mapping[str, StoredDroplets]) -> tuple[str, ...]:
     """Why images by name have no common scale: they are not as large."""
     first: dict[tuple[int, int], str] = {}
     for name, image in images.items():
-        for one in json.loads(str(image.provenance["exposures"])).values():
+        for one in stored_json(image.provenance, "exposures").values():
             if size_px := one.get("image_size_px"):
                 first.setdefault(tuple(size_px), name)
     if len(first) < 2:
@@ -129,7 +130,7 @@ def unlike_sizes(images: Mapping[str, StoredDroplets]) -> tuple[str, ...]:
 
 def crowded(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
     """Why shots together are doubted, of which each may have too few shadows to say that many overlap."""
-    told = [one for shot in shots for one in json.loads(str(shot.provenance["exposures"])).values()]
+    told = [one for shot in shots for one in stored_json(shot.provenance, "exposures").values()]
     overlapping = sum(int(np.count_nonzero(shot.columns["overlapping"])) for shot in shots)
     clumps = sum(one["left_out"].get("not_round", 0) for one in told)
     doubt = _crowded(overlapping, clumps, sum(one["droplets"] for one in told))

@@ -7,6 +7,7 @@ from typing import Any
 
 from daq.files.run_directory import NotesChange, RunConditions, RunNotes, RunReader, ShotFileError, Spray
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.stored_json import stored_json
 
 CHANGED = "conditions_changed"
 """Of a file of droplets: who changed the conditions before it was measured, when, and what was recorded."""
@@ -92,8 +93,8 @@ def _since(name: str, now: RunConditions, change: NotesChange, measured: Said) -
 
 def _said(told: Mapping[str, Any]) -> Said:
     """Every condition under its name."""
-    notes = json.loads(str(told.get("notes", "{}")))
-    return {**json.loads(str(told.get("spray", "{}"))), **notes, **notes.pop("more", {})}
+    notes = stored_json(told, "notes")
+    return {**stored_json(told, "spray"), **notes, **notes.pop("more", {})}
 
 
 def _differences(now: Said, before: Said, was: str) -> str:

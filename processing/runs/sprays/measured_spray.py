@@ -16,6 +16,7 @@ from processing.analysis.lingering_droplets import lingering_told
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_doubts import NOT_STATED, noted
 from processing.analysis.spray.spray_sample import box_told
+from processing.analysis.stored_json import stored_json
 from processing.runs.droplets_in_place import read_in_place
 from processing.runs.sprays.conditions import changes_told, spray_around
 
@@ -228,14 +229,14 @@ def _measured(spray: MeasuredSpray) -> dict[str, object]:
 def _made_by(provenance: Mapping[str, Any]) -> dict[str, object]:
     """What a measurement depends on."""
     names = ("calibration", "method_version")
-    settings = json.loads(str(provenance.get("settings", "{}")))
+    settings = stored_json(provenance, "settings")
     settings.pop("grid", None)  # told as the box, wherever it comes from
     return {**{name: provenance.get(name) for name in names}, **settings}
 
 
 def _separation(shots: Sequence[StoredDroplets]) -> dict[str, object]:
     """How far apart their exposures are, and who says so."""
-    velocities = [json.loads(str(shot.provenance.get("velocity", "{}"))) or {} for shot in shots]
+    velocities = [stored_json(shot.provenance, "velocity") for shot in shots]
     known = [(one["separation_ns"] / 1000, one["separation_source"]) for one in velocities if "separation_ns" in one]
     apart = dict.fromkeys(f"{us:.4g} us as {source}" for us, source in known)
     return {"separation": " and ".join(apart)} if apart else {}

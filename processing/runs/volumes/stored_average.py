@@ -1,13 +1,13 @@
 """The mean of volumes on the disk; those that have no common mean are refused."""
 
 import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from processing.analysis.stored_json import stored_json
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import StoredVolume, VolumeFileError, open_volume
 from processing.runs.results_file import LATER_FIELDS, Provenance, volume_path
@@ -107,7 +107,7 @@ def _own_name(provenance: Provenance) -> str:
 
 def _made_by(provenance: Provenance) -> dict[str, object]:
     """Run, calibration, version of the methods, and settings of a volume, one by one. Its grid speaks for itself."""
-    settings = json.loads(str(provenance.get("settings", "{}")))
+    settings = stored_json(provenance, "settings")
     settings.pop("grid", None)
     told = {name: provenance.get(name) for name in ("run", *LATER_FIELDS, "calibration")}
     return {**told, "method_version": provenance.get("method_version", 1), **settings}

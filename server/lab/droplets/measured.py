@@ -1,6 +1,5 @@
 """What the files of droplets of a run say: shot by shot, and of the spray as a whole."""
 
-import json
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +11,7 @@ from daq.frozen_model import FrozenModel
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics, hidden_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.analysis.stored_json import stored_json
 from processing.analysis.velocity.velocity_statistics import VelocityStatistics, velocity_statistics
 from processing.runs.droplets.measured_shot import droplets_path
 from processing.runs.droplets_in_place import read_in_place
@@ -97,7 +97,7 @@ def _read(files: tuple[tuple[Path, int], ...], _run_changed_ns: int) -> Measured
 
 
 def _told(stored: StoredDroplets) -> ShotOfDroplets:
-    exposures = json.loads(str(stored.provenance["exposures"])).values()
+    exposures = stored_json(stored.provenance, "exposures").values()
     ratios = [ratio for exposure in exposures if (ratio := exposure["residual_over_noise"]) is not None]
     verdicts = [ShotVerdict(exposure["verdict"]) for exposure in exposures]
     return ShotOfDroplets(
