@@ -9,6 +9,7 @@ from processing.analysis.alone_droplets import alone_in_shots
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.stored_json import stored_json
 from processing.analysis.unlike_numbers import unlike_numbers_of_shots
+from processing.count import counted
 from processing.geometry import FloatArray
 
 COMPONENTS = ("u_m_s", "v_m_s", "w_m_s")
@@ -26,7 +27,7 @@ def exposure_doubts(shots: Sequence[StoredDroplets], frames: str = "ab") -> tupl
     """Doubts on the exposures of some frames."""
     told = [stored_json(shot.provenance, "exposures") for shot in shots]
     exposures = [exposure for shot in told for frame, exposure in shot.items() if frame in frames]
-    unsure = tuple(f"{count} exposures {why}" for count, why in _unsure(exposures))
+    unsure = tuple(_unsure(exposures, "exposure"))
     numbers = unlike_numbers_of_shots(shots) if set(frames) >= {"a", "b"} else ""
     return (*unsure, *([numbers] if numbers else []))
 
@@ -35,7 +36,7 @@ def velocity_doubts(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
     """Doubts on the velocities; none where nobody could measure any."""
     velocities = [stored_json(shot.provenance, "velocity") for shot in shots]
     flying = [(shot, rows) for shot in shots if (rows := _flying(shot)) is not None]
-    unsure = (f"velocities of {count} shots {why}" for count, why in _unsure(velocities))
+    unsure = (f"velocities of {doubt}" for doubt in _unsure(velocities, "shot"))
     return (*unsure, *alone_in_shots(shots).told, *_against(flying), *_faster(flying))
 
 
@@ -51,9 +52,9 @@ def _faster(flying: Flying) -> Iterator[str]:
     ratios = np.maximum(speeds_m_s, SLOWEST_M_S) / max(float(np.median(speeds_m_s)), SLOWEST_M_S)
     if len(odd := np.flatnonzero(np.abs(np.log(ratios)) > np.log(MOST_FASTER))):
         yield (
-            f"droplets of {len(odd)} of {len(flying)} shots fly {MOST_FASTER:g} times faster or slower than those of "
-            f"the others ({flying[odd[0]][0].name}: {speeds_m_s[odd[0]]:.3g} m/s, all: {np.median(speeds_m_s):.3g} "
-            "m/s): is the separation right in all of them, and are they of one spray?"
+            f"droplets of {len(odd)} of {counted(len(flying), 'shot')} fly {MOST_FASTER:g} times faster or slower than "
+            f"those of the others ({flying[odd[0]][0].name}: {speeds_m_s[odd[0]]:.3g} m/s, all: "
+            f"{np.median(speeds_m_s):.3g} m/s): is the separation right in all of them, and are they of one spray?"
         )
 
 
@@ -67,8 +68,8 @@ def _against(flying: Flying) -> Iterator[str]:
     main *= np.sign(np.median(np.sign(main))) or 1.0
     if odd := [shot for (shot, _), cosine in zip(ways, main, strict=True) if cosine < AGAINST]:
         yield (
-            f"droplets of {len(odd)} of {len(ways)} shots fly against those of the others ({odd[0].name}): are "
-            "exposures A and B exchanged in some? Their mean velocity is of no spray"
+            f"droplets of {len(odd)} of {counted(len(ways), 'shot')} fly against those of the others ({odd[0].name}): "
+            "are exposures A and B exchanged in some? Their mean velocity is of no spray"
         )
 
 
@@ -88,8 +89,9 @@ def _way(velocities_m_s: FloatArray) -> FloatArray | None:
     return np.asarray(mean / amount) if amount > TOGETHER * speed else None
 
 
-def _unsure(told: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
+def _unsure(told: Sequence[Mapping[str, Any]], what: str) -> Iterator[str]:
     """How many of how many, and what is with them, by the first one's reason."""
-    for verdict, what in UNSURE.items():
+    for verdict, why in UNSURE.items():
         if chosen := [one for one in told if one.get("verdict") == verdict]:
-            yield f"{len(chosen)} of {len(told)}", ": ".join([what, *chosen[0].get("reasons", ())[:1]])
+            number = f"{len(chosen)} of {counted(len(told), what)}"
+            yield ": ".join([f"{number} {why}", *chosen[0].get("reasons", ())[:1]])

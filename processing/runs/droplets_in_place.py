@@ -11,6 +11,7 @@ from processing.analysis.droplets.droplet_file import REMEDY, DropletFileError, 
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL
 from processing.analysis.seal import SEAL
 from processing.analysis.stored_json import stored_json
+from processing.count import counted
 from processing.reconstruction.settings import GridSettings
 from processing.runs.run_around import of_another_run
 
@@ -55,6 +56,6 @@ def _require_in_box(path: Path, stored: StoredDroplets) -> None:
         outside = (places < span_mm[0] - margin_mm) | (places > span_mm[-1] + margin_mm)
         if outside.any():
             raise DropletFileError(
-                f"{path}: was changed: {int(outside.sum())} droplets have {name} outside of {span_mm[0]:g} to "
-                f"{span_mm[-1]:g} mm, where they were looked for: {REMEDY}"
+                f"{path}: was changed: {counted(int(outside.sum()), 'droplet')} have {name} outside of "
+                f"{span_mm[0]:g} to {span_mm[-1]:g} mm, where they were looked for: {REMEDY}"
             )

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from daq.counted import counted
+from processing.count import counted as counted_in_processing
 
 ROOT = Path(__file__).parents[2]
 THINGS = (
@@ -28,10 +29,16 @@ def plurals(module: Path) -> Iterator[str]:
 
 
 def test_one_thing_is_not_many() -> None:
-    assert [counted(number, "shot") for number in (0, 1, 2)] == ["0 shots", "1 shot", "2 shots"]
+    for said in (counted, counted_in_processing):
+        assert [said(number, "shot") for number in (0, 1, 2)] == ["0 shots", "1 shot", "2 shots"]
 
 
 @pytest.mark.parametrize("room", sorted(path.name for path in (ROOT / "server").iterdir() if path.is_dir()))
 def test_what_the_desk_the_server_and_commands_say_of_one_thing_is_not_said_of_many(room: str) -> None:
     modules = sorted((ROOT / "server" / room).rglob("*.py"))
     assert [one for module in modules for one in plurals(module)] == []
+
+
+def test_nor_is_what_processing_says_of_the_shots_of_a_run() -> None:
+    modules = [*(ROOT / "processing" / "runs").rglob("*.py"), ROOT / "processing" / "analysis" / "shot_doubts.py"]
+    assert [one for module in sorted(modules) for one in plurals(module)] == []

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from daq.files.run_directory import ImageKey
+from processing.count import counted
 from processing.image_file import ImageFileError, page_count
 from processing.kernels import _native
 from processing.runs.manifest.image_pattern import ImagePattern
@@ -128,11 +129,11 @@ def _numbers(
         numbers = found.get(view, ())
         if missing := sorted(set(every).difference(numbers)):
             fullest = max(found, key=lambda name: len(found[name]))
-            counts = f"{view} has {len(numbers)} images, {fullest} has {len(found[fullest])}"
+            counts = f"{view} has {counted(len(numbers), 'image')}, {fullest} has {len(found[fullest])}"
             raise source.error((*key, next(iter(entry.patterns))), f"{counts}: shot {missing[0]} of {view} is missing")
     if len(np.unique(np.diff(every))) > 1:
         gap = int(np.argmax(np.diff(every)))
-        lost = f"between {every[gap]} and {every[gap + 1]} shots are missing of all views"
+        lost = f"shots between {every[gap]} and {every[gap + 1]} are missing of all views"
         remedy = "say shots = [first, last] of what there is, once for each part"
         raise source.error((*key, next(iter(entry.patterns))), f"{lost}; {remedy}")
     return every
@@ -148,14 +149,16 @@ def _numbers_in_stacks(
             pages = _page_count(source, (*key, name, view), pattern.file(view, 0))
             count, first = count or pages, first or f"{view} has {pages} in {name}"
             if pages != count:
-                raise source.error((*key, name), f"{view} has {pages} images, {first}")
+                raise source.error((*key, name), f"{view} has {counted(pages, 'image')}, {first}")
     if (count or 0) % pages_per_shot:
-        raise source.error((*key, "frame_b"), f"{count} images are no pairs A, B, A, B, ...")
+        raise source.error((*key, "frame_b"), f"{counted(count or 0, 'image')} are no pairs A, B, A, B, ...")
     there = range((count or 0) // pages_per_shot)
     if entry.shots is None:
         return there
     if entry.shots[1] not in there:
-        raise source.error((*key, "shots"), f"{entry.shots[1]} is beyond the {len(there)} shots that are there")
+        raise source.error(
+            (*key, "shots"), f"{entry.shots[1]} is beyond the {counted(len(there), 'shot')} that are there"
+        )
     return there[entry.shots[0] : entry.shots[1] + 1]
 
 

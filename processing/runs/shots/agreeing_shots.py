@@ -7,6 +7,7 @@ from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.self_calibration import SelfCalibration, self_calibrate
 from processing.calibration.errors import CalibrationError
 from processing.calibration.verdict import Verdict
+from processing.count import counted
 from processing.runs.shots.shot_check import (
     Exposure,
     ShotCheck,
@@ -42,9 +43,9 @@ def _require_agreement(by_shot: Mapping[int, Sequence[Exposure]], corrected: Cal
     checks = [check_places(shot, by_shot[shot], corrected) for shot in asked]
     if against := [check for check in checks if check.verdict in (Verdict.WARN, Verdict.REFUSE)]:
         raise CalibrationError(
-            f"run {run}: {len(against)} of {len(checks)} shots that were asked by themselves speak against what all "
-            f"tell together: {_told(against[0])}. Correct by shots before or after something changed (--shots); "
-            "tomoshadow check says what each of them tells"
+            f"run {run}: {len(against)} of {counted(len(checks), 'shot')} that were asked by themselves speak against "
+            f"what all tell together: {_told(against[0])}. Correct by shots before or after something changed "
+            "(--shots); tomoshadow check says what each of them tells"
         )
 
 

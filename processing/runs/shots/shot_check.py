@@ -16,6 +16,7 @@ from processing.calibration.droplets.self_calibration import CLEARER, NOISE_PX
 from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.fit.health import LIMITS_PX, judge
 from processing.calibration.verdict import Verdict
+from processing.count import counted
 from processing.geometry import FloatArray
 from processing.runs.shots.turned_views import meeting_sights
 
@@ -198,6 +199,6 @@ def require_droplets(calibration: Calibration, exposures: Sequence[Exposure]) ->
     if blind := [name for name, count in counts.items() if not count]:
         by_view = ", ".join(f"{name} {count}" for name, count in counts.items())
         raise CalibrationError(
-            f"{', '.join(blind)}: no droplet is seen (droplets in {len(exposures)} exposures: {by_view}); "
+            f"{', '.join(blind)}: no droplet is seen (droplets in {counted(len(exposures), 'exposure')}: {by_view}); "
             "is a lens covered, or a light off?"
         )

@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 
+from processing.count import counted
 from processing.light import light_share
 from processing.preprocessing import Polarity
 from processing.reconstruction.choices import ReconstructionMethod
@@ -77,7 +78,7 @@ def light_line(shares: Mapping[ExposureKey, Shares], settings: ReconstructionSet
     whose = "of half-dark shadows " if is_more else ""
     how_much = f"voxels {whose}by {settings.method.value} are up to {100 * lost[faintest]:.0f} % fainter for that alone"
     return (
-        f"light: {len(faint)} of {len(lost)} exposures had less or more than their backgrounds: {how_much} "
+        f"light: {len(faint)} of {counted(len(lost), 'exposure')} had less or more than their backgrounds: {how_much} "
         f"(shot {shot}, exposure {frame.upper()}: {views}); compare no values of other light, or record the "
         "background anew"
     )

@@ -17,6 +17,7 @@ from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_doubts import NOT_STATED, noted
 from processing.analysis.spray.spray_sample import box_told
 from processing.analysis.stored_json import stored_json
+from processing.count import counted
 from processing.runs.droplets_in_place import read_in_place
 from processing.runs.sprays.conditions import changes_told, spray_around
 
@@ -193,7 +194,7 @@ def _shared(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
     for first, other in combinations(sprays, 2):
         if shared := in_common(other.shots, first.shots):
             yield (
-                f"{other.name} and {first.name} have {shared} shots in common: they are no two samples, and "
+                f"{other.name} and {first.name} have {counted(shared, 'shot')} in common: they are no two samples, and "
                 "chance makes less of a difference than is told"
             )
 

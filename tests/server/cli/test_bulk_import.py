@@ -96,7 +96,7 @@ def test_shots_that_all_views_have_lost_are_told(folder: Path, capsys: Capture) 
         for frame in "ab":
             (folder / view / f"im0005_{frame}.png").unlink()
     error = refused(capsys, "import", write_manifest(folder, PAIRS), "-o", folder / "out")
-    assert "between 4 and 6 shots are missing of all views; say shots = [first, last]" in error
+    assert "shots between 4 and 6 are missing of all views; say shots = [first, last]" in error
     parts = PAIRS + "shots = [3, 4]\n" + PAIRS + "shots = [6, 7]\n"
     told(capsys, "import", write_manifest(folder, parts), "-o", folder / "out")
     assert_pairs(folder / "out" / "run", [3, 4, 6, 7])

@@ -49,7 +49,7 @@ def test_doubtful_and_refused_exposures_are_told_with_their_reasons() -> None:
     told = doubts(saying(nobody, exposures=exposure("refused")), *SHOTS[1:])
     assert told == "1 of 4 exposures are refused, and do not count: it is blurred"
     alone = spray_statistics([saying(nobody, exposures=exposure("refused"))])
-    assert alone.doubts == ("1 of 1 exposures are refused, and do not count: it is blurred",)
+    assert alone.doubts == ("1 of 1 exposure are refused, and do not count: it is blurred",)
 
 
 def test_doubtful_velocities_are_told() -> None:

@@ -79,7 +79,7 @@ def test_a_separation_in_another_unit_is_told(tmp_path: Path, capsys: pytest.Cap
     assert shot["velocity"]["verdict"] == "doubtful"
     assert "faster than any spray: is the separation of" in shot["velocity"]["reasons"][0]
     (doubt,) = result["velocity"]["doubts"]
-    assert doubt.startswith("velocities of 1 of 1 shots are doubtful, and count: droplets fly at")
+    assert doubt.startswith("velocities of 1 of 1 shot are doubtful, and count: droplets fly at")
 
 
 def test_an_image_that_is_there_twice_gives_no_velocity(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
