@@ -24,6 +24,8 @@ NEAR_MM = 2.5 / SCALE_PX_PER_MM
 LEAST_STRAY, LEAST_STRAYS = 0.1, 3
 """Share of the droplets, and number, that may be missed or be ghosts: docs/measure.md promises fewer, in the mean."""
 SIZES = ("d10_um", "d32_um", "d43_um", "dv10_um", "dv50_um", "dv90_um")
+OF_B = " b"
+"""Ends what is told of droplets in exposure B, which a doubt of velocities casts doubt on, too: A again, or another."""
 TOGETHER = ("conditions_changed", "copies", "same_droplets", "depth", "few_together")
 
 
@@ -75,7 +77,9 @@ def judged(world: World, answer: Answer, named: Sequence[str]) -> Verdict:
         return Verdict("refused", (), (answer.error,))
     doubts, of_velocities = _doubts(answer)
     wrong = [] if doubts else list(_wrong_droplets(world, answer))
-    if not doubts and not of_velocities:
+    if of_velocities:
+        wrong = [one for one in wrong if not one.number.endswith(OF_B)]
+    elif not doubts:
         wrong += _wrong_velocities(world, answer)
     ordered = tuple(sorted(wrong, key=lambda one: -abs(one.error)))
     if ordered:

@@ -176,6 +176,15 @@ def test_a_doubt_of_velocities_leaves_wrong_diameters_a_lie() -> None:
     assert judged(WORLD, replace(answer, said={**answer.said, "shots": shots}), []).outcome == "lie"
 
 
+def test_a_doubt_of_velocities_excuses_an_exposure_b_that_is_another() -> None:
+    answer = truthful(WORLD)
+    doubtful = {"verdict": "refused", "reasons": ["A and B are the same image"]}
+    shots = [{"verdict": "good", "reasons": [], "velocity": doubtful}]
+    another = replace(answer, told={**answer.told, (0, 1): elsewhere(answer).told[0, 1]})
+    assert judged(WORLD, another, []).outcome == "lie"
+    assert judged(WORLD, replace(another, said={**answer.said, "shots": shots}), []).outcome == "doubted"
+
+
 def test_an_undistorted_world_is_measured_right() -> None:
     case = case_of(replace(drawn("single", 3), stated_light="gaussian"), {}, np.random.default_rng(3))
     assert (case.outcome, case.distortions) == ("right", ())

@@ -3,6 +3,7 @@
 Discs that are larger than their blur are black in their middle, and that is asked (``shadow_light.grey``). Smaller ones
 never are: behind a veil of light they look smaller, below black larger, and with another blur they explain the images
 nearly as well as ever. But not quite: they are fitted anew at several levels, and the one that leaves least is told.
+Pale shadows have no say: those that a second flash makes are told as small droplets, and fit best below black.
 """
 
 from collections.abc import Callable
@@ -28,6 +29,8 @@ SURE = 2.0
 """Standard deviations."""
 DRAWS = 100
 """Of droplets with replacement."""
+PALE = 0.25
+"""Of the light, that a shadow takes at most at its centre which has no say where enough others have one."""
 DEEPEST = 0.97
 """Of the light, that a disc takes at its centre when its fit begins; those above ``LARGE`` are as large as before."""
 LARGE = 0.9
@@ -70,7 +73,10 @@ def black_doubts(shot: Transmissions, search: DropletSearch, fit: ShadowFit) -> 
     """What the droplets say against the black level; empty where they are too few to say anything."""
     if len(fit.discs) < LEAST_DROPLETS:
         return ()
-    return black_level(lambda share: _left(shot, search, fit, share)).doubts
+    asked = _depths(shot, fit) > PALE
+    if np.count_nonzero(asked) < LEAST_DROPLETS:
+        asked = np.ones(len(asked), np.bool_)
+    return black_level(lambda share: _left(shot, search, fit, share)[asked]).doubts
 
 
 def black_level(left: Callable[[float], FloatArray]) -> BlackLevel:
@@ -122,8 +128,17 @@ def _left(shot: Transmissions, search: DropletSearch, fit: ShadowFit, share: flo
 
 def _deeper(shot: Transmissions, fit: ShadowFit, share: float) -> Discs:
     """Discs about as large as they must be to be as dark behind a veil: where a fit begins."""
-    blurs_px = fit.optics.blurs_px(fit.discs.positions_voxel[:, 2]).mean(axis=0)
-    wide_voxel2 = 2 * (blurs_px / shot.lattice.pixels_per_voxel) ** 2
-    depths = 1 - np.exp(-fit.discs.squares_voxel2 / wide_voxel2)
-    deeper = -np.log(1 - np.minimum(depths / (1 - share), DEEPEST)) * wide_voxel2
+    depths = _depths(shot, fit)
+    deeper = -np.log(1 - np.minimum(depths / (1 - share), DEEPEST)) * _wide_voxel2(shot, fit)
     return Discs(fit.discs.positions_voxel, np.where(depths < LARGE, deeper, fit.discs.squares_voxel2))
+
+
+def _depths(shot: Transmissions, fit: ShadowFit) -> FloatArray:
+    """Share of the light that each disc takes at its centre, (N,)."""
+    return np.asarray(1 - np.exp(-fit.discs.squares_voxel2 / _wide_voxel2(shot, fit)))
+
+
+def _wide_voxel2(shot: Transmissions, fit: ShadowFit) -> FloatArray:
+    """Twice the variance of the blur at each disc, mean of the views, (N,)."""
+    blurs_px = fit.optics.blurs_px(fit.discs.positions_voxel[:, 2]).mean(axis=0)
+    return np.asarray(2 * (blurs_px / shot.lattice.pixels_per_voxel) ** 2)
