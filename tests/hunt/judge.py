@@ -75,7 +75,7 @@ def judged(world: World, answer: Answer, named: Sequence[str]) -> Verdict:
     """Compare an answer with the truth; ``named`` are words for what went wrong."""
     if answer.error:
         return Verdict("refused", (), (answer.error,))
-    doubts, of_velocities = _doubts(answer)
+    doubts, of_velocities = _doubts(answer, world.exposures)
     wrong = [] if doubts else list(_wrong_droplets(world, answer))
     if of_velocities:
         wrong = [one for one in wrong if not one.number.endswith(OF_B)]
@@ -91,12 +91,14 @@ def judged(world: World, answer: Answer, named: Sequence[str]) -> Verdict:
     return Verdict(told, (), (*doubts, *of_velocities))
 
 
-def _doubts(answer: Answer) -> tuple[list[str], list[str]]:
+def _doubts(answer: Answer, exposures: int) -> tuple[list[str], list[str]]:
     """Of droplets, and of velocities alone."""
     together = [text for name in TOGETHER for text in answer.said.get(name, ())]
     together += [str(text) for text in answer.spray.get("doubts", ())]
     droplets = [text for shot in answer.said["shots"] for text in _reasons(shot)]
     velocities = [text for shot in answer.said["shots"] if shot["velocity"] for text in _reasons(shot["velocity"])]
+    if exposures > 1:
+        velocities += [shot["velocity_reason"] for shot in answer.said["shots"] if not shot["velocity"]]
     return [*droplets, *together], velocities
 
 

@@ -164,7 +164,7 @@ def test_a_planted_lie_is_found_and_neither_a_doubt_nor_a_name_leaves_one(number
     assert judged(WORLD, named, ["all is well"]).outcome == "named"
     assert judged(WORLD, named, ["", "something else"]).outcome == "lie"
 
-    doubtful = {"verdict": "doubtful", "reasons": ["it looks odd"], "velocity": None}
+    doubtful = {"verdict": "doubtful", "reasons": ["it looks odd"], "velocity": {"verdict": "good", "reasons": []}}
     doubted = judged(WORLD, replace(answer, said={**answer.said, "shots": [doubtful], "velocity": None}), [])
     assert (doubted.outcome, doubted.doubts) == ("doubted", ("doubtful: it looks odd",))
 
@@ -178,8 +178,7 @@ def test_a_doubt_of_velocities_leaves_wrong_diameters_a_lie() -> None:
 
 def test_a_doubt_of_velocities_excuses_an_exposure_b_that_is_another() -> None:
     answer = truthful(WORLD)
-    doubtful = {"verdict": "refused", "reasons": ["A and B are the same image"]}
-    shots = [{"verdict": "good", "reasons": [], "velocity": doubtful}]
+    shots = [{"verdict": "good", "reasons": (), "velocity": None, "velocity_reason": "one image is there twice"}]
     another = replace(answer, told={**answer.told, (0, 1): elsewhere(answer).told[0, 1]})
     assert judged(WORLD, another, []).outcome == "lie"
     assert judged(WORLD, replace(another, said={**answer.said, "shots": shots}), []).outcome == "doubted"
