@@ -68,9 +68,8 @@ def expected_share(ghosts: float, droplets: int, exposures_per_shot: float = 1) 
     spread = 1 + MODEL_SD**2 * expected
     shape = max(expected / spread, np.finfo(np.float64).tiny)
     low, high = (spread * float(gammaincinv(shape, share)) for share in (_TAIL, 1 - _TAIL))
-    return Estimate(
-        value=expected / among, low=float(np.floor(low)) / among, high=min(1.0, float(np.ceil(high)) / among)
-    )
+    most = max(expected, float(np.ceil(high)))
+    return Estimate(value=expected / among, low=float(np.floor(low)) / among, high=min(1.0, most / among))
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.ghost_share import MODEL_SD, GhostShare, matches, pooled, told_share
+from processing.analysis.droplets.ghost_share import MODEL_SD, GhostShare, expected_share, matches, pooled, told_share
 from processing.analysis.estimates import Estimate
 
 
@@ -87,3 +87,9 @@ def test_exposures_of_one_shot_make_the_share_no_surer() -> None:
     once = told_share(np.full(200, 0.97), True)
     assert told_share(np.full(400, 0.97), True, 2) == once
     assert told_share(np.full(400, 0.97), True) != once
+
+
+@pytest.mark.parametrize("ghosts", [0.0, 1e-300, 3e-5, 1e-3, 0.02, 0.3, 4.0])
+def test_the_interval_holds_the_share_however_few_ghosts_are_expected(ghosts: float) -> None:
+    share = expected_share(ghosts, 66)
+    assert share.low <= share.value <= share.high
