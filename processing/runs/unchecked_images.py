@@ -37,6 +37,15 @@ SCALE = Unchecked(
 """Of a single view, whose lines of sight meet no others."""
 
 
+DEPTH_OF_FIELD = Unchecked(
+    "from how much depth droplets of each size are: large ones stay sharp and dark enough to be measured farther out "
+    "of focus than small ones, so that means are of what is seen in the image, and too large for the spray",
+    "nothing where all droplets are within the depth of field of the smallest ones (tomoshadow optics); else several "
+    "views with --calibration, which tell where each droplet is",
+)
+"""Of a single view, which does not know how deep droplets lie."""
+
+
 ORDER = Unchecked(
     "whether A is the earlier exposure: were they exchanged, all droplets would fly the other way, and pair as well",
     "[spray] nozzle and direction in the run: statistics and report doubt those against which droplets fly",
@@ -189,6 +198,7 @@ def unchecked_images(
         yield LAMPS
     if single:
         yield SCALE
+        yield DEPTH_OF_FIELD
     if um_per_px is not None:
         yield stated_scale(um_per_px)
     if undirected:
