@@ -16,6 +16,7 @@ from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import pair
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S, MOST_STILL, STILL
 from processing.geometry import FloatArray
+from processing.volume import VoxelGrid
 
 MOST_APART = 1.5
 """Ratio of the median speeds of the same droplets, by tracks and by both exposures of a shot."""
@@ -113,25 +114,37 @@ def alone_doubts(tracks: Columns, shots: Sequence[StoredDroplets], rate_hz: floa
     tracks, shots, rate_hz
         As of ``rate_doubts``.
     """
+    if not len(ways_mm := _common_ways_mm(tracks, rate_hz)) or not (grid := measured_grid(shots[0])):
+        return
+    numbers = {_number(shot) for shot in shots}
+    asked = [shot for shot in shots if P_REAL in shot.columns and numbers >= _around(_number(shot))]
+    staying = [(shot, _staying(shot, grid, ways_mm)) for shot in asked]
+    p_real = [np.asarray(shot.columns[P_REAL], np.float64)[rows] for shot, rows in staying]
+    linked = [np.isin(rows, tracks["droplet"][tracks["shot"] == _number(shot)]) for shot, rows in staying]
+    alone = alone_among(np.concatenate([np.empty(0), *p_real]), np.concatenate([np.empty(0, np.bool_), *linked]))
+    yield from alone.said("stay in the grid are on no track", "are not seen again", MOST_OFF)
+
+
+def _common_ways_mm(tracks: Columns, rate_hz: float) -> FloatArray:
+    """The shortest and longest common way (2, 3) from one shot to the next; (0, 3) where nothing moves."""
     velocities_m_s = np.column_stack([np.asarray(tracks[name], np.float64) for name in COMPONENTS])
     flying = velocities_m_s[np.isfinite(velocities_m_s).all(axis=1)]
-    if not len(flying) or not (grid := measured_grid(shots[0])):
-        return
-    ways_mm = np.quantile(flying, COMMON_WAYS, axis=0) * MM_PER_M / rate_hz
-    numbers = {int(shot.provenance["shot"]) for shot in shots}
-    p_real, on_track = [np.empty(0)], [np.empty(0, np.bool_)]
-    for shot in shots:
-        number = int(shot.provenance["shot"])
-        if P_REAL not in shot.columns or not numbers >= {number + one for one in range(-WATCHED, WATCHED + 1)}:
-            continue
-        of_a = shot.columns["frame"] == "a"
-        points_mm = np.column_stack([np.asarray(shot.columns[f"{axis}_mm"], np.float64)[of_a] for axis in "xyz"])
-        stays = np.all([grid.holds(points_mm + one * way) for one in (-WATCHED, WATCHED) for way in ways_mm], axis=0)
-        linked = np.isin(np.arange(len(points_mm)), tracks["droplet"][tracks["shot"] == number])
-        p_real.append(np.asarray(shot.columns[P_REAL], np.float64)[of_a][stays])
-        on_track.append(linked[stays])
-    alone = alone_among(np.concatenate(p_real), np.concatenate(on_track))
-    yield from alone.said("stay in the grid are on no track", "are not seen again", MOST_OFF)
+    return np.quantile(flying, COMMON_WAYS, axis=0) * MM_PER_M / rate_hz if len(flying) else flying
+
+
+def _staying(shot: StoredDroplets, grid: VoxelGrid, ways_mm: FloatArray) -> Indices:
+    """Rows of exposure A that stay in the grid for two shots before and after, by all common ways."""
+    points_mm = np.column_stack([np.asarray(shot.columns[f"{axis}_mm"], np.float64) for axis in "xyz"])
+    stays = np.all([grid.holds(points_mm + one * way) for one in (-WATCHED, WATCHED) for way in ways_mm], axis=0)
+    return np.flatnonzero(stays & (shot.columns["frame"] == "a"))
+
+
+def _around(number: int) -> set[int]:
+    return {number + one for one in range(-WATCHED, WATCHED + 1)}
+
+
+def _number(shot: StoredDroplets) -> int:
+    return int(shot.provenance["shot"])
 
 
 def uneven_doubts(frames: Sequence[MovingDroplets], ids: Sequence[Indices], first: int) -> Iterator[str]:
