@@ -112,7 +112,7 @@ def flat_statistics(shots: Sequence[StoredDroplets]) -> dict[str, Any]:
     return {f"{name[:-3]}_{unit}" if name.endswith("_um") else name: value for name, value in told.items()}
 
 
-def unlike_sizes(images: Mapping[str, StoredDroplets]) -> tuple[str, ...]:
+def unlike_image_sizes(images: Mapping[str, StoredDroplets]) -> tuple[str, ...]:
     """Why images by name have no common scale: they are not as large."""
     first: dict[tuple[int, int], str] = {}
     for name, image in images.items():

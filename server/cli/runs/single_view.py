@@ -169,7 +169,7 @@ def _result(
         crowded,
         droplets_twice,
         flat_statistics,
-        unlike_sizes,
+        unlike_image_sizes,
     )
     from processing.runs.single_view.stated_scale import scale_doubts
     from processing.runs.unchecked_images import told_unchecked, unchecked_images
@@ -178,7 +178,7 @@ def _result(
     doubts = (
         *droplets_twice(stored, options.um_per_px),
         *crowded(list(stored.values())),
-        *unlike_sizes(stored),
+        *unlike_image_sizes(stored),
         *scale_doubts(options.um_per_px, by_rig_um_per_px),
     )
     unchecked_um_per_px = options.um_per_px if by_rig_um_per_px is None else None
