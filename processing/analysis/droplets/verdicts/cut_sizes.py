@@ -2,7 +2,8 @@
 
 Diameters over the least one that all are found from, as logarithms, have a mean ``m`` and a standard deviation ``s``.
 Of a lognormal distribution that ends far above that least one ``s / m`` is small; of one that is cut through its middle
-it is 0.76 (Pearson and Lee 1908, Cohen 1949).
+it is 0.76 (Pearson and Lee 1908, Cohen 1949). The least one is that of a droplet out of focus, so some smaller ones are
+found, too: only what is expected below and not found is missing.
 """
 
 from collections.abc import Sequence
@@ -54,20 +55,23 @@ def cut_off(diameters_um: FloatArray, limit_um: float | FloatArray) -> str:
     if least <= MOST_LOST:
         return ""
     return (
-        f"about {100 * likely:.0f} % of the droplets, limit {100 * MOST_LOST:.0f} %, are smaller than "
-        f"{np.median(limits_um[known]):.3g} um, from which on all are found: the distribution of diameters goes on "
-        "below. D10 is too large and number density too small; D32 and quantiles by volume hardly notice"
+        f"about {100 * likely:.0f} % of the droplets, limit {100 * MOST_LOST:.0f} %, are missing: all are found from "
+        f"{np.median(limits_um[known]):.3g} um on, and the distribution of diameters goes on below. "
+        "D10 is too large and number density too small; D32 and quantiles by volume hardly notice"
     )
 
 
 def _lost_shares(logs: FloatArray) -> tuple[float, float]:
-    """Share of the distribution below 0: the least, which is sure, and the likeliest; 0 where it ends above."""
+    """Share of the droplets that is below 0 and not found: the least, which is sure, and the likeliest."""
     above = logs[logs >= 0]
     if len(above) < FEWEST or np.mean(above < NEAR) < LEAST_NEAR:
         return 0.0, 0.0
     spread = float(above.std() / above.mean())
     error = spread * np.sqrt((0.5 + spread**2) / len(above))
-    least, likely = np.interp([spread - SURE * error, spread], *_cut_shares()).tolist()
+    below = np.interp([spread - SURE * error, spread], *_cut_shares())
+    expected = len(above) * below / (1 - below)
+    found = len(logs) - len(above)
+    least, likely = (np.maximum(expected - found, 0) / (len(above) + np.maximum(expected, found))).tolist()
     return least, likely
 
 

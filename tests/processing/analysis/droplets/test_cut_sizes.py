@@ -28,6 +28,22 @@ def test_a_distribution_that_ends_above_the_limit_is_not_doubted(median_um: floa
     assert sum(bool(told(median_um, spread, count, seed)) for seed in range(50)) <= 2
 
 
+@pytest.mark.parametrize("count", [50, 150, 1000])
+def test_what_is_found_below_the_limit_is_not_missing(count: int) -> None:
+    """The limit is that of a droplet out of focus: in focus smaller ones are found."""
+    sprays = [18.5 * np.exp(0.4 * np.random.default_rng(seed).standard_normal(count)) for seed in range(50)]
+    below = np.mean([np.mean(spray < LIMIT_UM) for spray in sprays])
+    assert below == pytest.approx(0.14, abs=0.01)
+    assert sum(bool(cut_off(spray, LIMIT_UM)) for spray in sprays) <= 2
+
+
+def test_of_what_is_below_the_limit_only_the_part_that_is_not_found_is_missing() -> None:
+    sprays = [12.0 * np.exp(0.4 * np.random.default_rng(seed).standard_normal(20000)) for seed in range(10)]
+    found = [spray[(spray > LIMIT_UM) | (np.arange(20000) % 2 == 0)] for spray in sprays]
+    shares = [int(cut_off(some, LIMIT_UM).split("%")[0].split()[-1]) for some in found]
+    assert np.mean(shares) == pytest.approx(25, abs=6)
+
+
 def test_two_sizes_of_which_none_is_near_the_limit_are_whole() -> None:
     two = np.random.default_rng(0).normal([18.0, 80.0], [1.0, 5.0], (200, 2)).ravel()
     assert cut_off(two, LIMIT_UM) == ""
