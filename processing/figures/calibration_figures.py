@@ -71,8 +71,8 @@ def error_vectors_figure(calibration_set: CalibrationSet, calibration: Calibrati
     lengths_px = np.concatenate([np.linalg.norm(error, axis=1) for view in errors.values() for error in view])
     typical_px = float(np.quantile(lengths_px, _QUANTILE)) or 1.0
     columns = max(map(len, chosen.values()))
-    figure = Figure(figsize=(3.3 * columns + 0.6, 2.9 * len(chosen) + 0.5))
-    room = Room(left=0.7, right=0.2, bottom=0.5, top=0.95, across=0.6, down=0.75)
+    figure = Figure(figsize=(3.3 * columns + 0.6, 2.9 * len(chosen) + 0.8))
+    room = Room(left=0.7, right=0.2, bottom=0.5, top=1.25, across=0.6, down=0.75)
     panels = spaced_panels(figure, len(chosen), columns, room)
     for row, ((name, planes), colour) in enumerate(zip(chosen.items(), VIEW_COLOURS, strict=False)):
         size_px = calibration_set.views[name].image_size_px
