@@ -10,6 +10,7 @@ PAGE = ROOT / "docs" / "python.md"
 OLD_RUNS = ROOT / "tests" / "fixtures" / "v0.1.0" / "runs"
 
 
+@pytest.mark.timeout(900)  # 20 s of CPU time
 def test_the_page_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     data = {
