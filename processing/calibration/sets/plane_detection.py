@@ -150,7 +150,7 @@ def _first_look(
     """Sizes by view; what each image tells by itself, and why the others do not."""
     sizes_px: dict[str, Size] = {}
     found, missed = {}, {}
-    for index, image in enumerate(counted(images, lambda image: f"target in {image.where}")):
+    for index, image in enumerate(counted(images, lambda image: f"target in {image.view}, {image.where}")):
         pixels = image.read()
         size_px = (pixels.shape[1], pixels.shape[0])
         if sizes_px.setdefault(image.view, size_px) != size_px:
