@@ -42,8 +42,8 @@ def add(verbs: Verbs) -> None:
     parser.add_argument("--polarity", choices=("shadow", "bright"), help="default: as the run is recorded")
     parser.add_argument(
         "--grid",
-        metavar="X0:X1,Y0:Y1,Z0:Z1",
-        help="box in mm; default: the largest that all views see where they are calibrated",
+        metavar="X0:X1,Y0:Y1,Z0:Z1[@PITCH]",
+        help="box in mm, voxel edge in mm; default: the largest that all views see and are calibrated in",
     )
     parser.add_argument(
         "--twins",
