@@ -28,9 +28,10 @@ BRIGHTEST = 0.02
 """So many pixels are somewhere."""
 SATURATED_SHARE = 0.01
 """So many pixels of an image at full scale: more light than the camera can tell."""
-LEAST_FULL, PILED = 0.8, 2
+LEAST_FULL, PILED, BELOW = 0.8, 2, 8
 """Many cameras are full below their full scale: at so much of it or above, the highest grey value has more than a
-hundredth of the pixels, and that many times those of the next one. Light has noise, and its highest value a few."""
+hundredth of the pixels, and that many times those of each of the next eight. Light has noise, and its highest value a
+few; where it has none, it varies."""
 LEAST_KNOWN = 0.1
 """Share of the pixels of a view of which something must be known."""
 MOST_SCATTERED, PATCH_PX = 0.05, 5
@@ -248,8 +249,8 @@ def _full_share(frame: Frame, most: np.float32) -> float:
     full, highest = float(np.mean(frame > FULL * most)), int(frame.max(initial=0))
     if full > SATURATED_SHARE or highest < LEAST_FULL * most:
         return full
-    piled, below = (np.count_nonzero(frame == value) for value in (highest, highest - 1))
-    return piled / frame.size if piled > PILED * below else full
+    counts = np.bincount(frame.ravel()[frame.ravel() >= highest - BELOW].astype(np.intp) - (highest - BELOW))
+    return float(counts[-1]) / frame.size if counts[-1] > PILED * counts[:-1].max() else full
 
 
 def _unknown(background: Intensity, dark: Intensity | None, bits: int) -> str:

@@ -8,4 +8,4 @@ class ReconstructionError(BadInput):
 
 
 class RoughMapping(ReconstructionError):
-    """A mapping that bends too much within voxels to be sampled; most run away far outside of what was calibrated."""
+    """A mapping that voxels of such a width cannot sample; most run away far outside of what was calibrated."""

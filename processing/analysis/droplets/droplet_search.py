@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.sight_lattice import SightLattice, sight_lattice
 from processing.geometry import FloatArray, ViewMapping
 from processing.kernels import _native
-from processing.reconstruction.errors import ReconstructionError
+from processing.reconstruction.errors import ReconstructionError, RoughMapping
 from processing.reconstruction.planning.common_volume import scale_px_per_mm
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.volume import VoxelGrid
@@ -165,7 +165,7 @@ def _require_fine(mappings: Sequence[ViewMapping], grid: VoxelGrid) -> None:
     px_per_mm = float(np.mean([scale_px_per_mm(mapping, middle_mm) for mapping in mappings]))
     if not LEAST_PX_PER_VOXEL <= (width_px := grid.pitch_mm * px_per_mm) <= MOST_PX_PER_VOXEL:
         least_mm, most_mm = LEAST_PX_PER_VOXEL / px_per_mm, MOST_PX_PER_VOXEL / px_per_mm
-        raise ReconstructionError(
+        raise RoughMapping(
             f"a voxel of {grid.pitch_mm:.4g} mm is {width_px:.3g} px wide: droplets are looked for with "
             f"{LEAST_PX_PER_VOXEL} to {MOST_PX_PER_VOXEL} px per voxel; leave the pitch out of the grid, or state one "
             f"from {least_mm:.2g} to {most_mm:.2g} mm"

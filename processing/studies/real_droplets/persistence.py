@@ -18,6 +18,7 @@ from processing.analysis.velocity.measured_velocities import measure_velocities
 from processing.analysis.velocity.unpaired_ghosts import unpaired_ghost_share
 from processing.analysis.watched_droplets import Watched, watched
 from processing.figures.reality_figure import ToldShare, ghosts_figure
+from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import IMAGE_SIZE_PX, DropletCase
 from processing.studies.real_droplets.case_shares import CaseShare, share_statements
@@ -107,9 +108,15 @@ def _row(case: AnyCase, shots: Sequence[WatchedShot]) -> PersistenceRow:
         told=value,
         low=low,
         high=high,
-        expected=float(np.nanmean(1 - np.concatenate([shot.seen.p_real for shot in shots]))),
+        expected=_expected(np.concatenate([shot.seen.p_real for shot in shots])),
         reason=told if isinstance(told, str) else "",
     )
+
+
+def _expected(p_real: FloatArray) -> float:
+    """Share of ghosts by p_real; not a number where all shots are doubtful, which tell none."""
+    known = p_real[np.isfinite(p_real)]
+    return float(np.mean(1 - known)) if len(known) else float("nan")
 
 
 def persistence_shares(rows: Sequence[PersistenceRow]) -> list[CaseShare]:

@@ -14,7 +14,7 @@ from processing.studies.real_droplets.persistence import (
 from processing.studies.real_droplets.reality import RealityStudy
 from processing.studies.shadows.sizes import SizeCase
 
-CASE = SizeCase(62, 25, noise_percent=5)
+CASE = SizeCase(62, 35, noise_percent=5)
 
 
 @pytest.fixture(scope="module")
