@@ -61,8 +61,11 @@ class Transmissions:
         return replace(self, trust=trust)
 
     def noises_of(self, images: Sequence[Image]) -> FloatArray:
-        """Standard deviations (K,) of the noise of typical pixels in what is left of the images, or in the images."""
-        noises = [noise_of(image * np.sqrt(trust), trust > 0) for image, trust in zip(images, self.trust, strict=True)]
+        """Standard deviations (K,) of the noise of typical pixels in what is left of the images, or in the images.
+
+        Their level is no noise, however much trust differs from pixel to pixel, as behind a mosaic of colours.
+        """
+        noises = [_noise_beside_level(image, trust) for image, trust in zip(images, self.trust, strict=True)]
         return np.maximum(noises, LEAST_NOISE)
 
 
@@ -109,6 +112,12 @@ class ShadowFit:
         """Standard deviation of the depth of a faint shadow that stands alone."""
         clearness = self.optics.levels / self.noises
         return float(1 / np.sqrt(np.pi * np.sum(self.optics.variances_px2[:, 0] * clearness**2)))
+
+
+def _noise_beside_level(image: Image, trust: Image) -> float:
+    known = trust > 0
+    level = np.median(image[known]) if known.any() else np.float32(0)
+    return noise_of((image - level) * np.sqrt(trust), known)
 
 
 def seen_by(shot: Transmissions, fit: ShadowFit, drawn: Sequence[Image]) -> DiscImages:

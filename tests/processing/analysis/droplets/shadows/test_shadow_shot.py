@@ -239,6 +239,16 @@ def test_exchanged_views_are_refused(scene: ShadowScene) -> None:
     assert other.residual_over_noise > 2
 
 
+def test_pixels_behind_a_mosaic_of_colours_are_no_empty_view(scene: ShadowScene, shot: ShadowExposure) -> None:
+    """Some get less light than their neighbours, and are trusted less: that is no noise which hides all droplets."""
+    rows, columns = np.indices(scene.images[0].shape) % 2
+    mosaic = np.array([[0.6, 1.4], [1.4, 0.3]], np.float32)[rows, columns]
+    told = measure_shadows(scene.images, search_of(scene, MARGIN_VOXEL), trust=[mosaic] * len(scene.images))
+    assert told.verdict is ShotVerdict.GOOD, told.reasons
+    match, _ = matches(told.droplets.points_mm, shot.droplets.points_mm, 0.2 * scene.grid.pitch_mm)
+    assert np.mean(match >= 0) > 0.97
+
+
 def test_images_without_droplets_are_empty_and_a_covered_view_is_named(scene: ShadowScene) -> None:
     rng, search = np.random.default_rng(0), search_of(scene, MARGIN_VOXEL)
     empty = [rng.normal(1, 0.012, image.shape).astype(np.float32) for image in scene.images]
