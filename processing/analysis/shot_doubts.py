@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from processing.analysis.alone_droplets import alone_in_shots
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.stored_json import stored_json
+from processing.analysis.two_exposures.alone_droplets import alone_in_shots
+from processing.analysis.two_exposures.fast_leavers import leavers_in_shots
 from processing.analysis.unlike_numbers import unlike_numbers_of_shots
 from processing.count import counted
 from processing.geometry import FloatArray
@@ -37,7 +38,7 @@ def velocity_doubts(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
     velocities = [stored_json(shot.provenance, "velocity") for shot in shots]
     flying = [(shot, rows) for shot in shots if (rows := _flying(shot)) is not None]
     unsure = (f"velocities of {doubt}" for doubt in _unsure(velocities, "shot"))
-    return (*unsure, *alone_in_shots(shots).told, *_against(flying), *_faster(flying))
+    return (*unsure, *alone_in_shots(shots).told, *leavers_in_shots(flying), *_against(flying), *_faster(flying))
 
 
 Flying = Sequence[tuple[StoredDroplets, FloatArray]]

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict
 
 from daq.files.run_directory import RunHeader
-from processing.analysis.alone_droplets import MOST_ALONE, REMEDY
+from processing.analysis.two_exposures.alone_droplets import MOST_ALONE, REMEDY
 from processing.calibration.verdict import Unchecked
 from processing.preprocessing import Polarity
 

@@ -1,19 +1,20 @@
 """How fast the droplets of a double exposure fly, how sure that is, and whether to believe it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.alone_droplets import Alone, alone_among
 from processing.analysis.droplets.droplet_table import Columns, Droplets, SizedDroplets
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
+from processing.analysis.two_exposures.alone_droplets import Alone, alone_among
+from processing.analysis.two_exposures.fast_leavers import leavers_told, leaving_weights
+from processing.analysis.two_exposures.watched_droplets import staying
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import Pairing, pair
 from processing.analysis.velocity.velocity_table import M_S_PER_MM_NS, Velocities
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S, judged
-from processing.analysis.watched_droplets import staying
 from processing.volume import VoxelGrid
 
 Rows = Droplets | SizedDroplets
@@ -118,12 +119,18 @@ def measure_velocities(
         pairing = pairing.disbelieved()
     of_first, of_second = _velocities(first.droplets, second.droplets, pairing, separation_ns)
     told = MeasuredVelocities(of_first, of_second, separation_ns, stayed, alone, verdict, reasons)
-    if (speed_m_s := float(np.linalg.norm(told.mean_m_s or 0.0))) <= FASTEST_M_S:
-        return told
-    doubt = (
-        f"droplets fly at {speed_m_s:.3g} m/s, faster than any spray: is the separation of {separation_ns:g} ns right?"
-    )
-    return replace(told, verdict=ShotVerdict.DOUBTFUL, reasons=(*reasons, doubt))
+    doubts = tuple(_of_mean(told, grid))
+    return replace(told, verdict=ShotVerdict.DOUBTFUL, reasons=(*reasons, *doubts)) if doubts else told
+
+
+def _of_mean(told: MeasuredVelocities, grid: VoxelGrid) -> Iterator[str]:
+    """What is wrong with the mean, whatever the pairs are."""
+    if (speed_m_s := float(np.linalg.norm(told.mean_m_s or 0.0))) > FASTEST_M_S:
+        at = f"droplets fly at {speed_m_s:.3g} m/s, faster than any spray"
+        yield f"{at}: is the separation of {told.separation_ns:g} ns right?"
+    velocities_m_s = told.first.velocities_m_s[told.first.paired]
+    weights = leaving_weights(velocities_m_s, told.separation_ns, grid)
+    yield from leavers_told(velocities_m_s, weights, len(told.first))
 
 
 def _within(droplets: MovingDroplets, grid: VoxelGrid) -> NDArray[np.bool_]:

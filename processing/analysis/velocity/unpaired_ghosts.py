@@ -14,7 +14,7 @@ from scipy.special import ndtri
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import NO_P_REAL, NO_VOLUME, P_REAL, measured_grid
 from processing.analysis.estimates import CONFIDENCE, Estimate
-from processing.analysis.watched_droplets import SURE, Watched, watched
+from processing.analysis.two_exposures.watched_droplets import SURE, Watched, watched
 
 FEWEST_SURE, MOST_CLASSES = 50, 10
 """Of a class of sizes; all classes have as many."""

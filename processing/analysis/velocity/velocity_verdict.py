@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from processing.analysis.alone_droplets import Alone
 from processing.analysis.droplets.droplet_table import DropletRows
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
+from processing.analysis.two_exposures.alone_droplets import Alone
 from processing.analysis.velocity.common_motion import REACH_VOXEL
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import Pairing

@@ -14,9 +14,9 @@ from processing.analysis.droplets.droplet_file import joined
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, GhostShare, matches
 from processing.analysis.estimates import Estimate
+from processing.analysis.two_exposures.watched_droplets import Watched, watched
 from processing.analysis.velocity.measured_velocities import measure_velocities
 from processing.analysis.velocity.unpaired_ghosts import unpaired_ghost_share
-from processing.analysis.watched_droplets import Watched, watched
 from processing.figures.reality_figure import ToldShare, ghosts_figure
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS

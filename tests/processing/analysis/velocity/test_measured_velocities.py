@@ -39,6 +39,32 @@ def test_a_separation_in_another_unit_is_doubted(separation_ns: float) -> None:
     assert f"faster than any spray: is the separation of {separation_ns:g} ns right?" in velocities.reasons[-1]
 
 
+@pytest.mark.parametrize(("rows", "doubted"), [(40, True), (300, False)])
+def test_a_mean_that_lacks_fast_droplets_as_they_leave_the_box_is_doubted(rows: int, doubted: bool) -> None:
+    first, second, true = core_and_edge(rows)
+    grid = VoxelGrid((200, rows, 300), (0.0, 0.0, 0.0), PITCH_MM)
+    velocities = measure_velocities(measured(first, grid), measured(second, grid), grid, 6400.0)
+    speed_m_s = np.linalg.norm(velocities.first.velocities_m_s[velocities.first.paired], axis=1).mean()
+    assert (speed_m_s < 0.96 * true * PITCH_MM * 1e-3 / 6400e-9) == doubted
+    assert (velocities.verdict is ShotVerdict.DOUBTFUL) == doubted
+    assert any("leave the box between A and B more often" in reason for reason in velocities.reasons) == doubted
+
+
+def core_and_edge(rows: int) -> tuple[Exposed, Exposed, float]:
+    """Droplets that fly along y, fast in the middle of a box and slowly beside it; and the mean way of those in A."""
+    rng, box = np.random.default_rng(3), np.array([300, rows, 200])
+    places = rng.uniform((0, -40, 0), box + (0, 40, 0), (round(6 * (rows + 80)), 3))
+    away = np.linalg.norm((places - box / 2)[:, [0, 2]], axis=1)
+    way = 5 + 17 * np.exp(-((away / 60) ** 2))
+    ends = places, places + np.outer(way, [0, 1, 0]) + rng.normal(0, 0.1, places.shape)
+    seen = []
+    for there in ends:
+        (labels,) = np.nonzero(np.all((there > 0) & (there < box - 1), axis=1))
+        covariance = np.tile(0.04**2 * np.eye(3), (len(labels), 1, 1))
+        seen.append(Exposed(MovingDroplets(there[labels], covariance, np.sin(labels)), labels))
+    return seen[0], seen[1], float(way[seen[0].labels].mean())
+
+
 def test_a_grid_that_they_were_not_measured_in_is_refused() -> None:
     first, second = map(measured, exposures())
     elsewhere = VoxelGrid(GRID.shape, (10.0, 1.0, 0.5), PITCH_MM)

@@ -8,9 +8,9 @@ import pytest
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.estimates import Estimate
+from processing.analysis.two_exposures.watched_droplets import Watched, watched
 from processing.analysis.velocity.unpaired_ghosts import unpaired_ghost_share
 from processing.analysis.velocity.velocity_statistics import velocity_statistics
-from processing.analysis.watched_droplets import Watched, watched
 from processing.reconstruction.settings import GridSettings
 from processing.volume import VoxelGrid
 

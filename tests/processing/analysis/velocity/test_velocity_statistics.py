@@ -9,6 +9,8 @@ import pytest
 
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.velocity.velocity_statistics import velocity_statistics
+from processing.reconstruction.settings import GridSettings
+from processing.volume import VoxelGrid
 
 
 def shot(velocities_m_s: np.ndarray, stayed: int | None = None) -> StoredDroplets:
@@ -90,3 +92,19 @@ def test_without_velocities_every_reason_is_told_once() -> None:
 def test_shots_without_velocities_do_not_count() -> None:
     statistics = velocity_statistics([without("one exposure"), shot(drawn(np.random.default_rng(3), 20))])
     assert (statistics.shots, statistics.pairs, statistics.intervals_over) == (1, 20, "pairs")
+
+
+@pytest.mark.parametrize(("rows", "doubted"), [(60, True), (600, False)])
+def test_shots_together_tell_that_fast_droplets_leave_the_box(rows: int, doubted: bool) -> None:
+    rng = np.random.default_rng(6)
+    grid = VoxelGrid((200, rows, 300), (0.0, 0.0, 0.0), 1 / 60)
+    told = []
+    for _ in range(6):
+        way = rng.uniform(2, 25, 40)
+        stays = rng.random(40) < 1 - way / rows
+        one = shot(np.where(stays[:, None], np.outer(way, [0, 2.6, 0]), np.nan))
+        its = json.loads(str(one.provenance["velocity"])) | {"separation_ns": 6400.0}
+        grids = {"velocity": json.dumps(its), "grid": GridSettings.of(grid).model_dump_json()}
+        told.append(replace(one, provenance={**one.provenance, **grids}))
+    doubts = velocity_statistics(told).doubts
+    assert any("leave the box between A and B more often" in doubt for doubt in doubts) == doubted

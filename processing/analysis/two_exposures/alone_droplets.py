@@ -14,7 +14,7 @@ from scipy.special import bdtrc
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import P_REAL, measured_grid
-from processing.analysis.watched_droplets import PARTNER, SURE, watched
+from processing.analysis.two_exposures.watched_droplets import PARTNER, SURE, watched
 from processing.geometry import FloatArray
 
 MOST_ALONE, MOST_ALONE_OR_GHOSTS = 0.05, 0.2
