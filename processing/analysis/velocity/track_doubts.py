@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.alone_droplets import alone_among
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import P_REAL, measured_grid
 from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.shot_doubts import COMPONENTS
+from processing.analysis.two_exposures.alone_droplets import alone_among
 from processing.analysis.velocity.common_motion import Indices
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import pair
@@ -30,6 +30,8 @@ TOGETHER = 0.5
 LEAST_JUMP, LEAST_JUMP_VOXEL, SURE = 0.15, 0.2, 5.0
 """Share of its way by which a median droplet is farther at once, the least of it, as rigs shake by some hundredths of a
 voxel, and standard deviations by which it is known."""
+MOST_DIRT, SLOW = 0.03, 0.25
+"""Share of the droplets on tracks that may stand still; below that share of their median speed others are slow."""
 THIN = 0.5
 """Share of the droplets of a shot that tracks link to the next one, below which they are paired anew."""
 MOST_OFF = 0.02
@@ -102,8 +104,19 @@ def still_doubts(tracks: Columns) -> Iterator[str]:
     known = np.isfinite(speeds_m_s) & np.isfinite(sd_m_s)
     if known.sum() < FEWEST:
         return
-    if (share := float(np.mean(speeds_m_s[known] < STILL * sd_m_s[known]))) > MOST_STILL:
-        yield f"{100 * share:.0f} % of the droplets on tracks stand still, as sure as that is known: is it dirt?"
+    still, speeds_m_s = speeds_m_s[known] < STILL * sd_m_s[known], speeds_m_s[known]
+    if _lies_still(still, speeds_m_s):
+        share = f"{100 * np.mean(still):.0f} % of the droplets on tracks stand still"
+        yield f"{share}, as sure as that is known: is it dirt? Means of velocities hold it"
+
+
+def _lies_still(still: NDArray[np.bool_], speeds_m_s: FloatArray) -> bool:
+    """Whether most stand still, or a part of them while hardly any of the others is slow."""
+    if np.mean(still) > MOST_STILL:
+        return True
+    slow = ~still & (speeds_m_s < SLOW * np.median(speeds_m_s[~still]))
+    few = max(MOST_DIRT * len(still), FEWEST)
+    return bool(np.count_nonzero(still) > few and np.count_nonzero(slow) < np.count_nonzero(still) / 2)
 
 
 def alone_doubts(tracks: Columns, shots: Sequence[StoredDroplets], rate_hz: float) -> Iterator[str]:

@@ -60,3 +60,10 @@ def test_droplets_of_another_motion_that_are_on_no_track_are_told(
 def test_series_of_one_motion_are_not_doubted(seed: int, scene: dict[str, float]) -> None:
     one = series(seed, frames=8, **{"density_per_mm3": 5.0, **scene})  # type: ignore[arg-type]
     assert track_droplets(shots(one), RATE_HZ).doubts == ()
+
+
+@pytest.mark.parametrize(("still", "told"), [(1.5, True), (0.0, False)])
+def test_dirt_among_droplets_that_fly_is_told(still: float, told: bool) -> None:
+    standing = series(9, still, 10, step=(0, 0, 0), scatter=0.0, turn=0.0, gradient=0.0)
+    tracks = track_droplets(shots(series(1, 4.0, 10), standing), RATE_HZ)
+    assert any("stand still, as sure as that is known: is it dirt?" in one for one in tracks.doubts) == told
