@@ -11,6 +11,7 @@
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from processing.analysis.estimates import Estimate, Figures, weighted_quantiles
@@ -27,6 +28,8 @@ EDGE = 0.1
 """Of the angle, to both sides: so wide is that ring; of the box's length: its last part."""
 MOST_LEAVING = 0.03
 """Of the liquid, about to leave the box by its sides: 6 % and more of a cone that does so, 2 at skirts of others."""
+MOST_CUT = 0.015
+"""The same, for an angle: of fans of which the sides cut a tenth it is 4 to 7 %, of cones of which they cut none 0."""
 FEWEST = 20
 TOO_NARROW = (
     "the box does not reach around the cone: it cuts off what flies farther out, and flux and densities are means over "
@@ -69,7 +72,8 @@ def spray_extent(sample: SpraySample, axis: SprayAxis) -> SprayExtent:
         return SprayExtent(cone_reason=missing, penetration_reason=missing)
     angles_deg = np.degrees(np.arctan2(radius_mm, along_mm))[along_mm > 0]
     half, most = _quantiles(chosen, 2 * angles_deg, SHARES)
-    wide_enough = most is None or _covered(axis, sample.box_mm, most.value / 2) >= LEAST_COVERED
+    around = most is None or _covered(axis, sample.box_mm, most.value / 2) >= LEAST_COVERED
+    wide_enough = around and not _cut(chosen, axis, sample.box_mm)
     (tip,) = _quantiles(chosen, along_mm[along_mm > 0], (TIP_SHARE,))
     goes_on = _goes_on(chosen, axis, sample.box_mm, tip.value if tip else 0.0)
     return SprayExtent(
@@ -109,8 +113,22 @@ def _goes_on(sample: SpraySample, axis: SprayAxis, box_mm: FloatArray, tip_mm: f
     last, cubes = along_mm > far_mm - EDGE * (far_mm - near_mm), sample.cubes_um3
     if cubes[last].sum() >= EDGE * EDGE / (1 - EDGE) * cubes[~last].sum():
         return GOES_ON
-    farther_mm = np.array(axis.nozzle_mm) + (1 + EDGE) * (sample.points_mm - np.array(axis.nozzle_mm))
-    leaves = ((farther_mm < box_mm[0]) | (farther_mm > box_mm[1])).any(axis=1)
-    before, by_its_sides = along_mm > (1 - EDGE) * tip_mm, leaves & ((1 + EDGE) * along_mm < far_mm)
+    leaves, by_its_sides = _leaving(sample, axis, box_mm)
+    before = along_mm > (1 - EDGE) * tip_mm
     leaving = cubes[before & leaves].sum() > EDGE * cubes[before].sum()
     return LEAVES if leaving or cubes[by_its_sides].sum() > MOST_LEAVING * cubes.sum() else None
+
+
+def _cut(sample: SpraySample, axis: SprayAxis, box_mm: FloatArray) -> bool:
+    """Whether liquid is about to leave the box by its sides: then more of it is beyond them."""
+    _, by_its_sides = _leaving(sample, axis, box_mm)
+    return bool(sample.cubes_um3[by_its_sides].sum() > MOST_CUT * sample.cubes_um3.sum())
+
+
+def _leaving(sample: SpraySample, axis: SprayAxis, box_mm: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which droplets would be beyond the box a tenth farther from the nozzle, and which of them beyond its sides."""
+    along_mm, _, _ = axis.coordinates(sample.points_mm)
+    _, far_mm = axis.reach_mm(box_mm)
+    farther_mm = np.array(axis.nozzle_mm) + (1 + EDGE) * (sample.points_mm - np.array(axis.nozzle_mm))
+    leaves = ((farther_mm < box_mm[0]) | (farther_mm > box_mm[1])).any(axis=1)
+    return leaves, leaves & ((1 + EDGE) * along_mm < far_mm)

@@ -15,7 +15,7 @@ from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_motion import AGAINST, ALL_ALIKE, NO_AXIS, NO_DENSITY, NO_VELOCITIES
 from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
 from processing.volume import VoxelGrid
-from tests.support.sampled_sprays import BOX, cone_points_mm, cone_shots, stored_shot
+from tests.support.sampled_sprays import BOX, cone_points_mm, cone_shots, in_box, stored_shot
 
 DOWN = SprayAxis((0, 0, 0), (0, 2, 0))
 ASKED = AskedFor(DOWN, liquid_kg_m3=1000.0)
@@ -331,6 +331,26 @@ def test_a_spray_that_leaves_the_box_by_its_sides_has_no_penetration(half_deg: f
     assert extent
     assert extent.penetration_mm is None
     assert "leaves the box by its sides" in (extent.penetration_reason or "")
+
+
+def fan(half_angle_deg: float) -> list[StoredDroplets]:
+    """Shots of a flat fan in the plane of x and y, of which the box holds what is within 4.95 mm of the axis."""
+    rng, made = np.random.default_rng(4), []
+    for shot in range(6):
+        along_mm = rng.uniform(8, 12, 400)
+        degrees = np.column_stack([rng.uniform(-half_angle_deg, half_angle_deg, 400), rng.normal(0, 2, 400)])
+        x_mm, z_mm = along_mm * np.tan(np.radians(degrees.T))
+        points_mm = np.column_stack([x_mm, along_mm, z_mm])
+        made.append(in_box(stored_shot(rng.uniform(30, 50, 400), points_mm, shot=shot)))
+    return made
+
+
+@pytest.mark.parametrize(("half_angle_deg", "told"), [(20, True), (30, False), (40, False)])
+def test_a_fan_that_the_box_cuts_at_both_sides_has_no_angle(half_angle_deg: float, told: bool) -> None:
+    extent = spray_statistics(fan(half_angle_deg), ASKED).extent
+    assert extent
+    assert (extent.cone_angle_deg is not None) == told
+    assert told or (extent.cone_angle_half_deg is None and "does not reach around" in (extent.cone_reason or ""))
 
 
 def test_a_core_that_ends_in_the_box_tells_no_penetration_of_a_cone_that_leaves_it_before() -> None:
