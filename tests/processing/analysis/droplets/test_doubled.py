@@ -55,14 +55,15 @@ def rng(seed: int = 5) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-def good(places_voxel: FloatArray) -> MeasuredExposure[Droplets, Droplets]:
+def good(places_voxel: FloatArray, heights: FloatArray | None = None) -> MeasuredExposure[Droplets, Droplets]:
     few = scene()
     count = len(places_voxel)
     droplets = replace(
         Droplets.none(),
         points_mm=places_voxel * BOX.pitch_mm,
         covariance_mm2=np.zeros((count, 3, 3)),
-        **{name: np.ones(count) for name in ("amplitudes", "amplitude_sd", "residual", "p_real")},
+        amplitudes=np.ones(count) if heights is None else heights,
+        **{name: np.ones(count) for name in ("amplitude_sd", "residual", "p_real")},
         views=np.full(count, len(few.believed)),
     )
     return MeasuredExposure(droplets, {}, 1.0, ShotVerdict.GOOD)
@@ -102,3 +103,33 @@ def test_copies_among_others_are_told(count: int, way_voxel: tuple[float, float,
     copies = (places + way_voxel + rng(6).normal(0, 1, places.shape))[: round(0.75 * count)]
     told = judged_by_copies(good(np.vstack([places, copies])), BOX)
     assert (told.verdict, len(told.reasons)) == (ShotVerdict.DOUBTFUL, 1)
+
+
+@pytest.mark.parametrize("count", [40, 150, 400])
+@pytest.mark.parametrize("seed", range(4))
+def test_few_copies_are_told_where_all_are_fainter(count: int, seed: int) -> None:
+    """As those of a second flash so weak that it shows the largest droplets alone."""
+    places, heights = anywhere(count, seed), rng(seed).lognormal(0, 0.4, count)
+    large = np.argsort(-heights)[: max(7, round(0.15 * count))]
+    copies = places[large] + [2, 9, -1] + rng(6).normal(0, 1, (len(large), 3))
+    both = np.vstack([places, copies]), np.concatenate([heights, 0.2 * heights[large]])
+    assert judged_by_copies(good(*both), BOX).verdict is ShotVerdict.DOUBTFUL
+
+
+@pytest.mark.parametrize("places_voxel", [anywhere(15), anywhere(60), anywhere(400), CLUSTERS, JET, TWO_JETS])
+@pytest.mark.parametrize("seed", range(4))
+def test_droplets_of_any_size_are_no_copies(places_voxel: FloatArray, seed: int) -> None:
+    heights = rng(seed).lognormal(0, 0.8, len(places_voxel))
+    assert judged_by_copies(good(places_voxel, heights), BOX).verdict is ShotVerdict.GOOD
+
+
+@pytest.mark.parametrize("kind", ["scattered", "in a cone"])
+@pytest.mark.parametrize("seed", range(3))
+def test_copies_that_fly_apart_are_told(kind: str, seed: int) -> None:
+    """By 3 voxels along each axis; or as in a cone, at speeds of 14 voxels that point away from its nozzle."""
+    places = anywhere(40, seed)
+    away = places - [150, -400, 150]
+    fanned = 14 * away / np.linalg.norm(away, axis=1)[:, None] + rng(seed + 9).normal(0, 1, places.shape)
+    ways = [14, 5, 0] + rng(seed + 9).normal(0, 3, places.shape) if kind == "scattered" else fanned
+    told = judged_by_copies(good(np.vstack([places, places + ways])), BOX)
+    assert told.verdict is ShotVerdict.DOUBTFUL
