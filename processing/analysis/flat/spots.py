@@ -22,7 +22,8 @@ class Spot:
     peak : float
         Darkness there.
     base : float
-        The lowest level at which it is alone: below, it is one with another spot, or is none.
+        The lowest level at which it is alone: below, it is one with another spot, or is none. 0 where it is alone at
+        the faintest level that is looked at.
     box : 4 ints
         First row, first column, rows and columns of its component at that level.
     """
@@ -52,7 +53,8 @@ def find_spots(values: NDArray[np.float32], least: float, height: float) -> list
     for level in np.linspace(max(top - 0.5 * height, least), least, LEVELS) if top > least else ():
         growing, ended = _flooded(values, float(level), height, growing, grown)
         grown += ended
-    return sorted((spot for spot in growing + grown if spot.peak - spot.base >= height), key=lambda spot: -spot.peak)
+    alone = [replace(spot, base=0.0) for spot in growing]
+    return sorted((spot for spot in alone + grown if spot.peak - spot.base >= height), key=lambda spot: -spot.peak)
 
 
 def _flooded(

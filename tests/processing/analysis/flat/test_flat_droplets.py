@@ -52,6 +52,16 @@ def matched(found: FlatDroplets, discs: Sequence[Disc]) -> list[tuple[Disc, int]
     ]
 
 
+@pytest.mark.parametrize("depth", [0.22, 0.25, 0.3])
+def test_pale_droplets_that_stand_out_are_measured_and_alone(depth: float) -> None:
+    discs = [(40.2, 40.0, 12.0), (110.0, 60.5, 20.0), (170.0, 110.2, 30.0), (60.0, 120.0, 16.0)]
+    found = measure_flat(LIGHT - depth * (LIGHT - shadow(discs, blur_px=1.0)))
+    assert len(found) == len(discs)
+    assert not found.overlapping.any()
+    for disc, nearest in matched(found, discs):
+        assert found.diameters_px[nearest] == pytest.approx(disc[2], rel=0.02)
+
+
 def test_what_is_known_of_the_light_is_used_and_brightness_means_nothing() -> None:
     light = LIGHT * (1 + 0.3 * np.sin(np.arange(SHAPE[1]) / 8.0)) * np.ones(SHAPE)
     discs = [(60.0, 60.0, 18.0), (150.0, 90.0, 25.0)]
