@@ -29,6 +29,15 @@ LAMPS = Unchecked(
 """Of shadows in several views."""
 
 
+OPAQUE = Unchecked(
+    "whether droplets are opaque alike: beside opaque ones, such as let light pass are told too small, those that take "
+    "half of it by a quarter of their diameter, bubbles by a fifth",
+    "nothing where all are of one liquid, free of bubbles; else measure one view (without --calibration), in which "
+    "each is sized at half of its own depth",
+)
+"""Likewise; where none is opaque the black level tells it."""
+
+
 SCALE = Unchecked(
     "whether the image is whole, and as wide as it is high for equal lengths: of one view nothing tells one that was "
     "squeezed, or half covered",
@@ -194,8 +203,8 @@ def unchecked_images(
     """
     if polarity == "bright" or not sizes_known:
         yield PROPORTION[polarity]
-    if polarity == "shadow" and not sizes_known and not single:
-        yield LAMPS
+    if polarity == "shadow" and not single:
+        yield from (OPAQUE,) if sizes_known else (LAMPS, OPAQUE)
     if single:
         yield SCALE
         yield DEPTH_OF_FIELD

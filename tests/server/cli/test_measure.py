@@ -212,9 +212,10 @@ def test_shadows_of_a_run_become_droplets_with_diameters(tmp_path: Path, capsys:
     shot, arguments = shadow_run(tmp_path)
     result = told(capsys, *arguments)
     assert (result["polarity"], result["shots"][0]["verdict"]) == ("shadow", "good")
-    gamma, lamps, _lengths, _depth = (one["what"] for one in result["not_checked"])
+    gamma, lamps, opaque, _lengths, _depth = (one["what"] for one in result["not_checked"])
     assert "a gamma near to 1 fits shadows" in gamma
     assert "whether all views are in the same light" in lamps
+    assert "whether droplets are opaque alike" in opaque
     stored = read_droplets(tmp_path / "out" / result["shots"][0]["file"])
     points_mm = np.column_stack([stored.columns[f"{axis}_mm"] for axis in "xyz"])
     of_found, of_truth = matches(points_mm, shot.points_mm, shot.grid.pitch_mm)
