@@ -48,10 +48,6 @@ COARSE_LEAST, SHARP_LEAST = 0.15, 0.5
 """Droplets with a fainter shadow are dropped: absolute, and as a share of the threshold."""
 RELIT_ROUNDS = 2
 """In which droplets, blur and level become those of another light."""
-SETTLING_ROUNDS, SETTLED_BLUR = 12, 3e-4
-"""In which the last droplets and their blur are fitted in turns, or until no blur changes by a larger share. Either
-explains much of what the other does: before, 37 droplets of 25 um were told 2 % too large behind a blur 4 % too wide.
-"""
 MASKED_ROUNDS = 2
 """For droplets that most views see through masks: they explain what is left, and are not told."""
 OPTICS_EVERY = 2
@@ -116,23 +112,20 @@ class ShadowRounds:
         """The very same droplets in other light, fitted to it."""
         if not len(fit.discs):
             return fit
-        other = relit(fit, condenser_ratio, self._shot.lattice.pixels_per_voxel)
-        return self._settled(other, RELIT_ROUNDS, SWEEPS[1])
+        return self._settled(relit(fit, condenser_ratio, self._shot.lattice.pixels_per_voxel))
 
     def left_around(self, fit: ShadowFit) -> FloatArray:
         """What is left around each droplet, squared, once the very same droplets are fitted to the images."""
-        return self._supports(self._settled(fit, RELIT_ROUNDS, SWEEPS[1])).residual ** 2
+        return self._supports(self._settled(fit)).residual ** 2
 
-    def _settled(self, fit: ShadowFit, rounds: int, sweeps: Sweeps) -> ShadowFit:
-        """The very same droplets and the optics, fitted in turns: so often, or until no blur changes."""
-        for _ in range(rounds):
+    def _settled(self, fit: ShadowFit) -> ShadowFit:
+        """The very same droplets, fitted."""
+        for _ in range(RELIT_ROUNDS):
             self._before_round()
             shadows = self._recorded().drawn(fit.optics, fit.discs)
             seen = seen_by(self._shot, fit, shadows.transmissions)
-            discs, _ = seen.fitted(shadows, fit.optics, fit.discs, sweeps)
-            before_px, fit = self._blurs_px(fit), self._estimated(fit.with_discs(discs), unite=False)
-            if np.all(abs(self._blurs_px(fit) / before_px - 1) < SETTLED_BLUR):
-                break
+            discs, _ = seen.fitted(shadows, fit.optics, fit.discs, SWEEPS[1])
+            fit = self._estimated(fit.with_discs(discs), unite=False)
         return fit
 
     def round(self, fit: ShadowFit, stage: Stage, *, estimate: bool, unite: bool = False) -> ShadowFit:
@@ -167,7 +160,6 @@ class ShadowRounds:
             fit = self.round(fit, Stage(SHARP_PX, _last(fit), joker=True, masked=True), estimate=True, unite=True)
         if not len(fit.discs):
             return fit
-        fit = self._settled(fit, SETTLING_ROUNDS, FINAL_SWEEPS)
         seen = self._seen(fit)
         discs, information = seen.fitted(seen.drawn(fit.optics, fit.discs), fit.optics, fit.discs, FINAL_SWEEPS)
         return fit.with_discs(discs.where(_significant(discs, information)))
@@ -238,12 +230,9 @@ class ShadowRounds:
             self._last = (fit.discs, fit.optics, self._recorded().drawn(fit.optics, fit.discs).transmissions)
         return self._last[2]
 
-    def _blurs_px(self, fit: ShadowFit) -> FloatArray:
-        lattice = self._shot.lattice
-        return fit.optics.blurs_px(0.5 * (lattice.nodes_px.shape[1] - 1) * lattice.spacing)
-
     def _blur_px(self, fit: ShadowFit) -> float:
-        return float(self._blurs_px(fit).mean())
+        lattice = self._shot.lattice
+        return float(fit.optics.blurs_px(0.5 * (lattice.nodes_px.shape[1] - 1) * lattice.spacing).mean())
 
     def _blur_voxel(self, fit: ShadowFit) -> float:
         return self._blur_px(fit) / self._shot.lattice.pixels_per_voxel
