@@ -51,7 +51,7 @@ def opened_tab(browser: Browser) -> Iterator[Page]:
     page.on("pageerror", lambda error: complaints.append(str(error)))
     yield page
     context.close()
-    assert complaints == []
+    assert not complaints, complaints
 
 
 _WITHOUT_KEYS = """() => {
