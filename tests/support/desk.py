@@ -44,8 +44,10 @@ def opened_tab(browser: Browser) -> Iterator[Page]:
     page, complaints = context.new_page(), list[str]()
 
     def listen(message: ConsoleMessage) -> None:
+        if "404" in message.text and "/api/" in message.location["url"]:
+            return  # a picture of what has gone meanwhile, or is not there yet
         if message.type == "error" or (message.type == "warning" and "GPU stall" not in message.text):
-            complaints.append(message.text)
+            complaints.append(f"{message.text}: {message.location['url']}")
 
     page.on("console", listen)
     page.on("pageerror", lambda error: complaints.append(str(error)))
