@@ -249,7 +249,8 @@ def _full_share(frame: Frame, most: np.float32) -> float:
     full, highest = float(np.mean(frame > FULL * most)), int(frame.max(initial=0))
     if full > SATURATED_SHARE or highest < LEAST_FULL * most:
         return full
-    counts = np.bincount(frame.ravel()[frame.ravel() >= highest - BELOW].astype(np.intp) - (highest - BELOW))
+    brightest = frame[frame >= highest - BELOW]
+    counts = np.bincount(brightest.astype(np.intp) - (highest - BELOW))
     return float(counts[-1]) / frame.size if counts[-1] > PILED * counts[:-1].max() else full
 
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +20,7 @@ from tests.support.serving import Serving, plan_of, serving
 
 PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
 """Folder for pictures of pages; without it none are taken. Those of the manual are listed in CONTRIBUTING.md."""
+_PICTURE_OF_A_RUN = re.compile(r"/api/runs/[^/]+/.*\.(jpg|png)")
 PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 
 
@@ -44,8 +46,8 @@ def opened_tab(browser: Browser) -> Iterator[Page]:
     page, complaints = context.new_page(), list[str]()
 
     def listen(message: ConsoleMessage) -> None:
-        if "404" in message.text and "/api/" in message.location["url"]:
-            return  # a picture of what has gone meanwhile, or is not there yet
+        if "404" in message.text and _PICTURE_OF_A_RUN.search(message.location["url"]):
+            return  # the run was deleted before its picture was drawn
         if message.type == "error" or (message.type == "warning" and "GPU stall" not in message.text):
             complaints.append(f"{message.text}: {message.location['url']}")
 
