@@ -1,6 +1,5 @@
 """What a file says its rows are good for, as columns and as texts: whoever opens a table alone is told, too."""
 
-import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -33,7 +32,7 @@ def told_texts(stored: Stored, frame: str = "") -> dict[str, str]:
         ``a`` or ``b``; empty: all.
     """
     if FRAME not in stored.columns:
-        doubts = json.loads(str(stored.provenance.get(DOUBTS, "[]")))
+        doubts = stored_json(stored.provenance, DOUBTS)
         return {VERDICT: str(ShotVerdict.DOUBTFUL if doubts else ShotVerdict.GOOD), DOUBTS: _joined(doubts)}
     exposures = stored_json(stored.provenance, "exposures")
     told = [one for name, one in exposures.items() if frame in ("", name)]

@@ -1,7 +1,7 @@
 """Whether tracks contradict the rate and the order of their shots: nothing else says that these are stated wrongly."""
 
-import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import P_REAL, measured_grid
 from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.shot_doubts import COMPONENTS
+from processing.analysis.stored_json import stored_json
 from processing.analysis.two_exposures.alone_droplets import alone_among
 from processing.analysis.velocity.common_motion import Indices
 from processing.analysis.velocity.moving_droplets import MovingDroplets
@@ -88,7 +89,7 @@ def order_doubts(tracks: Columns, shots: Sequence[StoredDroplets]) -> Iterator[s
     fewer = np.minimum(linked[:-1], linked[1:])
     if len(cuts := numbers[:-1][(fewer >= FEWEST) & (going_on < LEAST_LINKED * fewer)]):
         yield f"hardly a track goes on after {len(cuts)} of {len(shots)} shots (shot {_listed(cuts)}): {asked}"
-    yield from _backwards(tracks, str(shots[0].provenance.get("spray", "null")))
+    yield from _backwards(tracks, stored_json(shots[0].provenance, "spray"))
 
 
 def still_doubts(tracks: Columns) -> Iterator[str]:
@@ -241,8 +242,7 @@ def _listed(numbers: NDArray[np.intp]) -> str:
     return ", ".join(map(str, numbers[:MOST_LISTED])) + (" ..." if len(numbers) > MOST_LISTED else "")
 
 
-def _backwards(tracks: Columns, spray: str) -> Iterator[str]:
-    stated = json.loads(spray)
+def _backwards(tracks: Columns, stated: Mapping[str, Any]) -> Iterator[str]:
     velocities_m_s = np.column_stack([np.asarray(tracks[name], np.float64) for name in COMPONENTS])
     flying = velocities_m_s[np.isfinite(velocities_m_s).all(axis=1)]
     if not stated or not len(flying):

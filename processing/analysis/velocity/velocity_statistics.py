@@ -1,6 +1,5 @@
 """What the velocities of some shots say of a spray, as their files have them."""
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
@@ -13,6 +12,7 @@ from processing.analysis.droplets.droplet_statistics import require_poolable
 from processing.analysis.droplets.ghost_share import share_interval
 from processing.analysis.estimates import CONFIDENCE, Estimate
 from processing.analysis.shot_doubts import COMPONENTS, velocity_doubts
+from processing.analysis.stored_json import stored_json
 from processing.analysis.velocity.unpaired_ghosts import ghost_share_by_partners
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
@@ -91,8 +91,7 @@ def velocity_statistics(shots: Iterable[StoredDroplets]) -> VelocityStatistics:
 
 
 def _told(shot: StoredDroplets) -> Mapping[str, Any]:
-    told: Mapping[str, Any] = json.loads(str(shot.provenance.get("velocity", json.dumps({"reason": OLD}))))
-    return told
+    return stored_json(shot.provenance, "velocity") or {"reason": OLD}
 
 
 def _why(told: Iterable[Mapping[str, Any]]) -> str:

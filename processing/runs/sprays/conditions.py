@@ -66,7 +66,7 @@ def changes_told(shots: Sequence[StoredDroplets], files: Sequence[Path]) -> tupl
 
 def _of_shot(provenance: Mapping[str, Any], file: Path) -> Iterator[str]:
     name, measured = provenance.get("run", ""), _said(provenance)
-    if changed := json.loads(str(provenance.get(CHANGED, "null"))):
+    if changed := stored_json(provenance, CHANGED):
         differs = _differences(measured, _said(changed["recorded"]), "recorded")
         yield f"run {name} was changed by {changed['who']} at {changed['at_utc']}, after it was recorded: {differs}"
     run = run_around(file)

@@ -1,6 +1,5 @@
 """MeasuredSpray: the droplets of some shots that were measured alike, and what their files say of nozzle and axis."""
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -136,7 +135,7 @@ def _require_one(shots: Sequence[StoredDroplets], files: Sequence[Path], what: s
 
 def _axis(shots: Sequence[StoredDroplets], files: Sequence[Path]) -> SprayAxis | None:
     """As the files say; where they do not, as the run around them does: they are older, or it was stated later."""
-    stated = next((json.loads(str(shot.provenance["spray"])) for shot in shots if "spray" in shot.provenance), None)
+    stated = next((told for shot in shots if (told := stored_json(shot.provenance, "spray"))), None)
     if stated:
         return SprayAxis(tuple(stated["nozzle_mm"]), tuple(stated["axis"]))
     spray = spray_around(files[0])

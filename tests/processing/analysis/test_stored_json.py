@@ -6,7 +6,7 @@ from pathlib import Path
 from processing.analysis.stored_json import stored_json
 
 ROOT = Path(__file__).parents[3]
-READ_ELSEWHERE = re.compile(r'json\.loads\(str\([\w.]*(?:provenance|shot|told)\.get\([^,]+, "\{\}"\)')
+READ_ELSEWHERE = re.compile(r"json\.loads\(str\((?!self)[\w.]*(?:provenance|shot|told)[.\[]")
 
 
 def test_a_table_that_is_not_there_or_null_is_empty() -> None:
