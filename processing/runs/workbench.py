@@ -48,6 +48,10 @@ class Latest(Generic[Made]):
         self._made[key] = made
         return made
 
+    def known(self, key: Hashable) -> Made | None:
+        """What stands for the key, if it is there; it takes no room of others."""
+        return self._made.get(key)
+
 
 class Workbench:
     """Keeps the latest plan with its memory, and the latest references and plan of a run. Serves one shot at a time.

@@ -177,7 +177,7 @@ class CalibrationWatch:
                 return None
             if job.kind is JobKind.RECONSTRUCTION:
                 account.results_id = job.results_id
-            seldom = seldom_meeting(self._meetings.of((job.run_id, account.results_id), dict))
+            seldom = seldom_meeting(self._meetings.known((job.run_id, account.results_id)) or {})
             odd = next((shot for shot in seldom if shot not in account.asked), None)
             if odd is None:
                 return None

@@ -247,6 +247,17 @@ def test_every_shot_that_stands_out_is_checked_one_after_the_other() -> None:
     assert sorted(asked) == [8, 9, 10, 11, 12]
 
 
+def test_runs_without_volumes_make_nobody_forget_volumes() -> None:
+    """The newest eight results are compared; checks of runs that have none take the place of no others."""
+    watch, _ = watch_of([0.1])
+    for shot in range(4):
+        made(watch, shot)
+    for number in range(8):
+        watch.learn(ended(0, 0.1).model_copy(update={"run_id": f"without volumes {number}"}))
+    odd, _ = made(watch, 4, droplets=3)
+    assert odd is not None
+
+
 def test_a_view_that_is_pale_is_told_with_the_volumes_of_its_shot() -> None:
     watch, _ = watch_of([])
     assert [made(watch, shot)[1] for shot in range(3)] == [""] * 3
