@@ -88,11 +88,19 @@ SPARSE = Unchecked(
 
 
 CROPPED = Unchecked(
-    "whether images of target and shots were cut alike: rows that were cut elsewhere in all views move all droplets "
+    "whether images of target and shots were cut alike: that rows were cut elsewhere in all views moves all droplets "
     "along y, and everything agrees",
     "nothing where OffsetY and Height were the same for both; else images of the target that are cut as the shots are",
 )
 """Of images from elsewhere; a rig reads whole images, of target and shots alike."""
+
+
+MOVED = Unchecked(
+    "whether all views still look where they did at the target: a frame with all cameras that sank, or a target that "
+    "stood elsewhere than was stated, moves all droplets along y, and everything agrees",
+    "nothing where only the differences of places count; else images of the target, or of the nozzle, of the same day",
+)
+"""Of runs of a rig: what moves all views alike along y moves no line of sight away from the others."""
 
 
 VALUES: dict[Polarity, Unchecked] = {
@@ -107,9 +115,9 @@ VALUES: dict[Polarity, Unchecked] = {
 """Of values of volumes; without a dark image, black counts as grey value 0."""
 
 
-def unknown_crop(header: RunHeader) -> list[Unchecked]:
-    """What nothing tells of where the images of a run were cut."""
-    return [CROPPED] if "import" in header.configuration else []
+def unknown_height(header: RunHeader) -> Unchecked:
+    """What nothing tells of how high all views look: images from elsewhere may be cut, cameras of a rig may sink."""
+    return CROPPED if "import" in header.configuration else MOVED
 
 
 def stated_scale(um_per_px: float) -> Unchecked:

@@ -8,7 +8,7 @@ import numpy as np
 from tests.hunt import bodily, imaged
 from tests.hunt.world import Pictures, World
 
-_GREYS = "proportion to light"
+_GREYS, _HEIGHT = "proportion to light", "moves all droplets along y"
 Bodily = Callable[[World, float, np.random.Generator], tuple[World, str]]
 Imaged = Callable[[Pictures, float, np.random.Generator], tuple[Pictures, str]]
 
@@ -43,7 +43,7 @@ def _on(function: Imaged, named: str = "") -> tuple[str, Distortion]:
 DISTORTIONS = dict(
     (
         _of(bodily.view_shifted),
-        _of(bodily.views_shifted, "cut alike"),
+        _of(bodily.views_shifted, _HEIGHT),
         _of(bodily.view_scaled),
         _of(bodily.views_scaled, "same focus"),
         _of(bodily.view_rolled),
@@ -96,7 +96,7 @@ DISTORTIONS = dict(
         _on(imaged.lost_frame),
         _on(imaged.dimmer_b),
         _on(imaged.longer_b),
-        _on(imaged.cropped, "cut alike"),
+        _on(imaged.cropped, _HEIGHT),
         _on(imaged.mirrored, "mirrored"),
         _on(imaged.background_of_spray),
     )

@@ -34,12 +34,12 @@ def check(options: Namespace) -> Outcome:
     from processing.calibration.calibration_file import load_calibration
     from processing.calibration.verdict import Verdict
     from processing.runs.shots.shot_check import ALARM_PX, STOP_PX
-    from processing.runs.unchecked_images import told_unchecked, unknown_crop
+    from processing.runs.unchecked_images import told_unchecked, unknown_height
 
     calibration = load_calibration(options.calibration)
     shots, odd = _shot_by_shot(options, calibration)
     with RunReader(options.run) as run:
-        unchecked = told_unchecked(unknown_crop(run.header), progress)
+        unchecked = told_unchecked([unknown_height(run.header)], progress)
     for doubt in (depth := doubts_of(added(shot.sights for shot in shots))):
         progress(f"{options.run.name}: {doubt}")
     verdict = _verdict(shots, odd, depth)

@@ -111,10 +111,10 @@ def ask_droplets(
     """Check the first, the middle and the last shot; what speaks against the calibration is told at once."""
     from daq.files.run_directory import RunReader
     from processing.runs.run_check import check_few
-    from processing.runs.unchecked_images import VALUES, unknown_crop
+    from processing.runs.unchecked_images import VALUES, unknown_height
 
     with RunReader(run_dir) as run:
-        unchecked = (VALUES[run.header.polarity], *unknown_crop(run.header))
+        unchecked = (VALUES[run.header.polarity], unknown_height(run.header))
     asked = Belonging(run_dir.name, tuple(check_few(run_dir, shots, calibration, workbench)), unchecked)
     _tell(asked)
     return asked

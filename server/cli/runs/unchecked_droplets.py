@@ -29,12 +29,12 @@ def tell_unchecked(
         even_rows,
         told_unchecked,
         unchecked_images,
-        unknown_crop,
+        unknown_height,
         unlike_motions,
     )
 
     with RunReader(run_dir) as run:
-        cropped = unknown_crop(run.header)
+        height = unknown_height(run.header)
         undirected = run.header.frames_per_shot == 2 and run.conditions.spray is None
         unscaled = not nominal_scales(run.header.configuration) and not settings.sizes
     velocities = (shot.velocity for shot in shots if shot.velocity)
@@ -53,4 +53,4 @@ def tell_unchecked(
     rows = even_rows(row_spacing_mm) if any(shot.velocity and shot.velocity.pairs for shot in shots) else []
     good = [shot.velocity for shot in shots if shot.velocity and shot.velocity.verdict == "good"]
     alone = [velocity.share_alone for velocity in good if velocity.share_alone is not None]
-    return told_unchecked([*unchecked, *rows, *unlike_motions(alone), *cropped], progress)
+    return told_unchecked([*unchecked, *rows, *unlike_motions(alone), height], progress)
