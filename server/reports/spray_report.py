@@ -33,6 +33,7 @@ from server.reports.spray_tables import (
     figures_table,
     fits_table,
     patternation_table,
+    twice,
 )
 
 DEFINITIONS = (
@@ -96,17 +97,13 @@ def spray_sections(reported: ReportedSpray, chapters: Sequence[Chapter] = ()) ->
 def _summary(reported: ReportedSpray) -> Section:
     told = reported.told
     seen = (
-        f"{counted(told.droplets.n, 'droplet')}, exposures: {told.droplets.exposures}{_twice(told)}, "
+        f"{counted(told.droplets.n, 'droplet')}, exposures: {told.droplets.exposures}{twice(told)}, "
         f"shots: {told.droplets.shots}; sampling: {told.sampling}."
     )
     text = f"{seen} {SAMPLES[told.sample.verdict] if told.sample else ''} {_verdicts(reported)}"
     liquid = ReportedLiquid.of_files(reported.spray.shots)
     table = figures_table(told, liquid_rows(liquid) if liquid else ())
     return Section("Summary", text, [table], points=[*conditions_of(reported), *doubts(told)])
-
-
-def _twice(told: SprayStatistics) -> str:
-    return " (A and B show the same droplets)" if told.droplets.exposures > told.droplets.shots else ""
 
 
 def conditions_of(reported: ReportedSpray) -> list[str]:

@@ -88,7 +88,13 @@ def doubts(told: SprayStatistics) -> list[str]:
     if told.extent:
         reached = (("cone angle", told.extent.cone_reason), ("penetration", told.extent.penetration_reason))
         said += [f"No {name}: {why}" for name, why in reached if why]
-    return [*said, *(f"No shares at {one.at_mm:.3g} mm: {one.reason}" for one in told.patternations if one.reason)]
+    said += [f"No shares at {one.at_mm:.3g} mm: {one.reason}" for one in told.patternations if one.reason]
+    return [*said, *(one.text for one in told.not_checked)]
+
+
+def twice(told: SprayStatistics) -> str:
+    """That each droplet is counted in two exposures; empty where it is not."""
+    return " (A and B show the same droplets)" if told.droplets.exposures > told.droplets.shots else ""
 
 
 def _grouped(reasons: Mapping[str, str]) -> list[str]:

@@ -49,7 +49,7 @@ _TAIL = (1 - CONFIDENCE) / 2
 class SizeStatistics(FrozenValue):
     """Diameters of a spray; where one is missing, ``reason`` says why."""
 
-    n: Annotated[int, Field(description="droplets")]
+    n: Annotated[int, Field(description="droplets in all exposures: A and B show the same ones, and both count")]
     shots: Annotated[int, Field(description="shots that they come from")]
     d10_um: Annotated[Estimate | None, Field(description="mean diameter")] = None
     d20_um: Annotated[Estimate | None, Field(description="of the mean surface")] = None

@@ -34,6 +34,7 @@ from processing.analysis.spray.spray_motion import (
 )
 from processing.analysis.spray.spray_sample import SpraySample, spray_sample
 from processing.analysis.velocity.velocity_statistics import velocity_statistics
+from processing.calibration.verdict import Unchecked
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 
@@ -104,6 +105,9 @@ class SprayStatistics(FrozenValue):
     doubts: Annotated[
         tuple[str, ...], Field(description="why not to trust the figures: verdicts of exposures, what contradicts")
     ] = ()
+    not_checked: Annotated[
+        tuple[Unchecked, ...], Field(description="what no droplet tells, and what to state so that it is known")
+    ] = ()
     reasons: Annotated[
         dict[str, str], Field(description="why a part is null or empty, and what to do about it, by its name")
     ] = Field(default_factory=dict)
@@ -158,6 +162,7 @@ def _of_sample(
         patternations=patternations,
         density_maps=tuple(map(ToldDensity.of, density_maps(sample))),
         corrections=(*CORRECTIONS, *_beyond_intervals(pooled)),
+        not_checked=extent.not_checked if extent else (),
         reasons=_reasons(sample, proposed, bool(fits), motion is not None) | _missing(sample, asked, patternations),
     )
 

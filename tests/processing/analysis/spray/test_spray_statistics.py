@@ -316,6 +316,36 @@ def test_a_spray_that_ends_in_the_box_has_a_penetration() -> None:
     assert value(extent.penetration_mm) == pytest.approx(10.97, abs=0.04)
 
 
+def in_clouds(ends_mm: float, clouds_mm: Sequence[tuple[float, float]]) -> SprayStatistics:
+    """A spray of clouds from and to so many mm from the nozzle, in a box that ends at another distance."""
+    rng, made = np.random.default_rng(3), []
+    box = VoxelGrid((100, round(10 * (ends_mm - 2)), 100), (-4.95, 2.05, -4.95), 0.1)
+    for shot in range(4):
+        along_mm = np.concatenate([rng.uniform(*cloud, 150) for cloud in clouds_mm])
+        points_mm = np.column_stack([rng.normal(0, 0.05, (len(along_mm), 2)) * along_mm[:, None], along_mm])[
+            :, [0, 2, 1]
+        ]
+        seen = points_mm[along_mm < ends_mm]
+        made.append(stored_shot(rng.uniform(30, 50, len(seen)), seen, shot=shot, grid=box))
+    return spray_statistics(made, ASKED)
+
+
+@pytest.mark.parametrize(("ends_mm", "penetration_mm"), [(9.0, 7.9), (20.0, None), (24.0, 17.5)])
+def test_a_spray_in_clouds_may_go_on_behind_a_gap(ends_mm: float, penetration_mm: float | None) -> None:
+    """Clouds end at 8 and 17.6 mm. A box that ends in the first gap says so; one that has seen it asks for more."""
+    told = in_clouds(ends_mm, [(2, 8), (12, 17.6)])
+    extent = told.extent
+    assert extent
+    if penetration_mm is None:
+        assert extent.penetration_mm is None
+        assert "has a gap of 4" in (extent.penetration_reason or "")
+        assert told.not_checked == ()
+    else:
+        assert value(extent.penetration_mm) == pytest.approx(penetration_mm, abs=0.1)
+        (unchecked,) = told.not_checked
+        assert f"behind a gap of {ends_mm - penetration_mm:.1g}" in unchecked.what
+
+
 @pytest.mark.parametrize(("half_deg", "lean_deg"), [(4.0, 30.0), (22.0, 0.0)])
 def test_a_spray_that_leaves_the_box_by_its_sides_has_no_penetration(half_deg: float, lean_deg: float) -> None:
     """A narrow one that leans, and a wide one: neither reaches the far end of the box, and both go on."""
