@@ -14,14 +14,17 @@ import numpy as np
 from pydantic import Field
 from scipy.special import stdtr, stdtrit
 
+from processing.analysis.droplets.droplet_statistics import DropletStatistics
 from processing.analysis.droplets.sizes_in_light import by_shots
 from processing.analysis.estimates import CONFIDENCE, Estimate, reach
 from processing.analysis.spray.spray_statistics import SprayStatistics
+from processing.count import counted
 from processing.reconstruction.settings import FrozenValue
 
 OF_DROPLETS = ("number_density_per_mm3", "d10_um", "d32_um", "dv10_um", "dv50_um", "dv90_um", "relative_span")
 OF_MOTION = ("speed_m_s", "volume_flux_mm_s", "flux_d32_um")
 OF_EXTENT = ("cone_angle_deg", "cone_angle_half_deg", "penetration_mm")
+FEWEST_SHOTS = 2
 NOTHING = (
     "no two runs have a figure of several shots in common; one shot says nothing of how shots differ: measure more"
 )
@@ -65,10 +68,31 @@ def differences(runs: Mapping[str, SprayStatistics]) -> tuple[Difference, ...]:
     )
 
 
+def not_compared(runs: Mapping[str, SprayStatistics]) -> tuple[str, ...]:
+    """Say which runs have no figure that can be compared, and why: else nothing is said of an empty run beside another.
+
+    Parameters
+    ----------
+    runs
+        As of ``differences``.
+    """
+    return tuple(
+        f"{name}: no figure of it is compared: {_why_not(one.droplets)}" for name, one in runs.items() if not _told(one)
+    )
+
+
+def _why_not(droplets: DropletStatistics) -> str:
+    if not droplets.n:
+        return f"none of its {counted(droplets.exposures, 'exposure')} that count has a droplet"
+    if droplets.shots < FEWEST_SHOTS:
+        return f"all its {counted(droplets.n, 'droplet')} are in one shot, which says nothing of how shots differ"
+    return droplets.reason or "its shots have no figure with an interval"
+
+
 def _told(statistics: SprayStatistics) -> dict[str, _Told]:
     """Figures of a run that can be compared, by their names."""
     shots = statistics.droplets.shots
-    if shots < 2:
+    if shots < FEWEST_SHOTS:
         return {}
     parts = ((statistics.motion, OF_MOTION), (statistics.extent, OF_EXTENT))
     estimates = {name: getattr(part, name) for part, names in parts if part for name in names}

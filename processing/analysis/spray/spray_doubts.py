@@ -23,6 +23,7 @@ from processing.analysis.spray.spray_motion import FEWEST, all_alike
 from processing.analysis.spray.spray_sample import SpraySample, box_told
 from processing.analysis.spray.steadiness import changes_of_spray
 from processing.analysis.stored_json import stored_json
+from processing.analysis.unlike_numbers import unlike_shots
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
 from processing.geometry import FloatArray
 
@@ -62,6 +63,7 @@ def spray_doubts(
     return (
         *exposure_doubts(shots),
         *few_together(shots),
+        *([unlike] if (unlike := unlike_shots(shots)) else []),
         *velocity_doubts(shots),
         *copies_told(shots),
         *lingering,

@@ -5,13 +5,15 @@ laid through them: ``t`` is a difference, or a slope, over its standard error, a
 chance makes the largest ``t`` of so many shots of one spray is drawn from normal numbers (a change at a place that
 nobody knows: Hawkins, Testing a sequence of observations for a shift in location, JASA 72, 1977). Shots of two sprays
 in turns are two heaps: the same is asked of the shots in the order of their values, beside normal numbers in theirs
-(Engelman and Hartigan, Percentage points of a test for clusters, JASA 64, 1969). More than 60 shots are taken in
-groups, which hides turns.
+(Engelman and Hartigan, Percentage points of a test for clusters, JASA 64, 1969). A single shot unlike all
+others is asked in the same way: it and the rest are the parts. More than 60 shots are taken in groups, which hides
+turns and single shots.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +36,12 @@ LEAST_TURN_DEG = 1.5
 """Of the direction, and of the nozzle as droplets see it."""
 LEAST_SHIFT = 0.1
 """Of how widely droplets lie along x, y or z: standard deviations."""
+FEWEST_OF_ODD, LEAST_ODD = 6, 3.0
+"""Shots, to call a single one odd; how many times as much it must change as a part of them."""
 EXACT = float(np.finfo(float).eps)
 """Share of the scatter that rounding leaves beside a change that explains all of it."""
+Parts = Literal["order", "turns", "one"]
+"""In what a spray may be split: first and later shots, shots of two kinds in turns, one shot and the others."""
 REMEDY = "means over them are of no one spray, and intervals do not know it: take those apart that belong together"
 
 
@@ -48,11 +54,16 @@ class _Series:
     least_ratio: float | None = None
     least: float = 0.0
     in_turns: bool = True
+    in_one: bool = True
 
     def matters(self, before: float, after: float) -> bool:
+        return self.matters_more(before, after, 1.0)
+
+    def matters_more(self, before: float, after: float, times: float) -> bool:
+        """Likewise, so many times as much."""
         if self.least_ratio is None:
-            return abs(after - before) > self.least
-        return max(before, after) > self.least_ratio * min(before, after)
+            return bool(abs(after - before) > times * self.least)
+        return bool(max(before, after) > self.least_ratio**times * min(before, after))
 
 
 def changes_of_spray(sample: SpraySample, axis: SprayAxis | None = None) -> tuple[str, ...]:
@@ -70,7 +81,7 @@ def changes_of_spray(sample: SpraySample, axis: SprayAxis | None = None) -> tupl
         return ()
     groups = np.arange(shots) // -(-shots // MOST)
     series = [*_of_numbers(sample, groups), *_of_flight(sample, axis, groups), *_of_places(sample, axis, groups)]
-    told = [said for one in series if (said := _in_order(one, groups) or _in_turns(one))]
+    told = [said for one in series if (said := _in_order(one, groups) or _in_turns(one) or _in_one(one, sample))]
     return (f"the spray changes over its shots: {'; '.join(told)}: {REMEDY}",) if told else ()
 
 
@@ -78,11 +89,11 @@ def _of_numbers(sample: SpraySample, groups: NDArray[np.intp]) -> Iterator[_Seri
     """Droplets per volume, which gusts make of any kind, and mean diameters: D10 knows a change sooner than D32."""
     with np.errstate(invalid="ignore", divide="ignore"):
         per_mm3 = np.bincount(groups[sample.shot], minlength=groups[-1] + 1) / np.bincount(groups, sample.volumes_mm3)
-    yield _Series("droplets per mm3 are {}", per_mm3, LEAST_RATIO_NUMBER, in_turns=False)
+    yield _Series("droplets per mm3 are {}", per_mm3, LEAST_RATIO_NUMBER, in_turns=False, in_one=False)
     d_um = sample.diameters_um
     number, length, area, volume = _sums(d_um[:, None] ** np.arange(4), sample, groups).T
     yield _Series("D10 is {} um", length / number, LEAST_RATIO)
-    yield _Series("D32 is {} um", volume / area, LEAST_RATIO, in_turns=False)  # single large droplets make heaps
+    yield _Series("D32 is {} um", volume / area, LEAST_RATIO, in_turns=False, in_one=False)  # large ones make heaps
 
 
 def _of_flight(sample: SpraySample, axis: SprayAxis | None, groups: NDArray[np.intp]) -> Iterator[_Series]:
@@ -119,7 +130,7 @@ def _of_places(sample: SpraySample, axis: SprayAxis | None, groups: NDArray[np.i
         yield _Series("seen from the nozzle droplets lie {} degrees from the axis", seen_deg, LEAST_RATIO)
     least_mm = LEAST_SHIFT * sample.points_mm.std(axis=0) if len(sample) else np.zeros(3)
     for name, places_mm, least in zip("xyz", _means(sample.points_mm, sample, groups).T, least_mm, strict=True):
-        yield _Series(f"in the mean droplets lie at {name} = {{}} mm", places_mm, least=float(least))
+        yield _Series(f"in the mean droplets lie at {name} = {{}} mm", places_mm, least=float(least), in_one=False)
 
 
 def _sums(values: FloatArray, sample: SpraySample, groups: NDArray[np.intp]) -> FloatArray:
@@ -138,7 +149,7 @@ def _means(values: FloatArray, sample: SpraySample, groups: NDArray[np.intp]) ->
 def _in_order(series: _Series, groups: NDArray[np.intp]) -> str:
     """How a figure changes from the first shots to the last ones; nothing where it does not, or chance explains it."""
     known = np.flatnonzero(np.isfinite(series.values))
-    if not (split := _split(series.values[known])):
+    if not (split := _split(series.values[known], "order")):
         return ""
     shots = int(np.searchsorted(groups, known[split]))
     return _said(series, series.values[known], split, f"in the first {shots} shots", f"in {len(groups) - shots} later")
@@ -147,10 +158,31 @@ def _in_order(series: _Series, groups: NDArray[np.intp]) -> str:
 def _in_turns(series: _Series) -> str:
     """What a figure is in shots of two kinds; nothing where there are none."""
     values = np.sort(series.values[np.isfinite(series.values)])
-    if not series.in_turns or not (split := _split(values, in_turns=True)):
+    if not series.in_turns or not (split := _split(values, "turns")):
         return ""
     share = round(100 * split / len(values))
     return _said(series, values, split, f"in {share} % of the shots", "in the others, in turns")
+
+
+def _in_one(series: _Series, sample: SpraySample) -> str:
+    """What a figure is in the one shot that is unlike all others; nothing where there is none.
+
+    Of shots with half as many droplets as most have: values of fewer scatter more, and weigh less.
+    """
+    numbers = np.bincount(sample.shot, minlength=len(sample.volumes_mm3))
+    if not series.in_one or len(numbers) != len(series.values):
+        return ""
+    asked = np.flatnonzero(np.isfinite(series.values) & (numbers >= np.median(numbers) / 2))
+    if len(asked) < FEWEST_OF_ODD or not np.ptp(values := series.values[asked]):
+        return ""
+    (t,) = _contrasts(values[None], "one")
+    odd = int(np.argmax(t))
+    parts = np.append(np.delete(values, odd), values[odd])
+    if t[odd] <= _by_chance(len(asked), "one") or not series.matters_more(parts[:-1].mean(), parts[-1], LEAST_ODD):
+        return ""
+    return _said(
+        series, parts, len(asked) - 1, "in the other shots", f"in one, the {asked[odd] + 1}. of {len(numbers)}"
+    )
 
 
 def _said(series: _Series, values: FloatArray, split: int, first: str, second: str) -> str:
@@ -160,20 +192,27 @@ def _said(series: _Series, values: FloatArray, split: int, first: str, second: s
     )
 
 
-def _split(values: FloatArray, *, in_turns: bool = False) -> int:
+def _split(values: FloatArray, parts: Parts) -> int:
     """Before which value a figure changes, if chance does not explain it; else 0."""
     n = len(values)
     if n < FEWEST or np.ptp(values) == 0:
         return 0
-    (t,) = _contrasts(values[None])
-    return 2 + int(np.argmax(t[: n - 3])) if t[: n - 3 + (not in_turns)].max() > _by_chance(n, in_turns) else 0
+    (t,) = _contrasts(values[None], parts)
+    return 2 + int(np.argmax(t[: n - 3])) if t.max() > _by_chance(n, parts) else 0
 
 
-def _contrasts(rows: FloatArray) -> FloatArray:
-    """Amount of ``t`` of every split, each part of two values at least, and of a straight line: (rows, n - 2)."""
-    n = rows.shape[1]
+def _patterns(n: int, parts: Parts) -> FloatArray:
+    """Every split, each part of two values at least, in order a straight line besides; or each value by itself."""
+    if parts == "one":
+        return np.eye(n)
     after = (np.arange(n) >= np.arange(2, n - 1)[:, None]).astype(np.float64)
-    patterns = np.vstack([after, np.arange(n)])
+    return np.vstack([after, np.arange(n)]) if parts == "order" else after
+
+
+def _contrasts(rows: FloatArray, parts: Parts) -> FloatArray:
+    """Amount of ``t`` of every pattern, (rows, patterns)."""
+    n = rows.shape[1]
+    patterns = _patterns(n, parts)
     patterns -= patterns.mean(axis=1, keepdims=True)
     patterns /= np.linalg.norm(patterns, axis=1, keepdims=True)
     centred = rows - rows.mean(axis=1, keepdims=True)
@@ -183,9 +222,9 @@ def _contrasts(rows: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(between * (n - 2) / within))
 
 
-@lru_cache(maxsize=2 * MOST)
-def _by_chance(n: int, in_turns: bool) -> float:
+@lru_cache(maxsize=3 * MOST)
+def _by_chance(n: int, parts: Parts) -> float:
     """What the largest ``t`` of n normal numbers stays below, as they come or in the order of their values."""
     drawn = np.random.default_rng(SEED).standard_normal((DRAWS, n))
-    t = _contrasts(np.sort(drawn))[:, :-1] if in_turns else _contrasts(drawn)
+    t = _contrasts(np.sort(drawn) if parts == "turns" else drawn, parts)
     return float(np.quantile(t.max(axis=1), 1 - CHANCE))

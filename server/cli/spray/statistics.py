@@ -48,29 +48,31 @@ def _told(options: Namespace, spray: "MeasuredSpray") -> "SprayStatistics":
 
 
 def _compare(options: Namespace) -> Outcome:
-    from processing.analysis.spray.comparison import NOTHING, differences
+    from processing.analysis.spray.comparison import NOTHING, differences, not_compared
     from processing.runs.sprays.measured_spray import read_compared
 
     sprays = read_compared(options.results)
     told = {name: _told(options, spray) for name, spray in sprays.sprays.items()}
-    found = differences(told)
+    found, alone = differences(told), not_compared(told)
     result = {
         "runs": {name: one.model_dump(mode="json") for name, one in told.items()},
         "conditions_differ": list(sprays.conditions),
         "measured_differently": list(sprays.unlike),
         "conditions_changed": [change for spray in sprays.sprays.values() for change in spray.changes],
+        "not_compared": list(alone),
         "differences": [one.model_dump(mode="json") for one in found],
         "reason": None if found else NOTHING,
     }
     differing = [*sprays.conditions, *(f"measured differently: {one}" for one in sprays.unlike)]
-    texts = [*(_text(spray, told[name]) for name, spray in sprays.sprays.items()), *differing]
+    texts = [*(_text(spray, told[name]) for name, spray in sprays.sprays.items()), *differing, *alone]
     return Outcome(result, "\n\n".join([*texts, _differences(found) if found else NOTHING]))
 
 
 def _text(spray: "MeasuredSpray", told: "SprayStatistics") -> str:
-    from server.reports.spray_tables import doubts, figure_rows
+    from server.reports.spray_tables import doubts, figure_rows, twice
 
     seen = f"{counted(told.droplets.n, 'droplet')}, shots: {told.droplets.shots}, exposures: {told.droplets.exposures}"
+    seen += twice(told)
     sample = f"; sample: {told.sample.verdict}" if told.sample else ""
     head = f"{spray.name}: {seen}; sampling: {told.sampling}{sample}"
     return "\n".join([head, table(["", "", "95 %"], figure_rows(told)), *doubts(told), *spray.changes])

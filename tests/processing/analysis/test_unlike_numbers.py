@@ -8,6 +8,7 @@ import pytest
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.shot_doubts import exposure_doubts
+from processing.analysis.spray.spray_doubts import spray_doubts
 from processing.runs.droplets.measured_shot import compared
 from tests.support.measured_exposures import measured
 from tests.support.moving_droplets import exposures
@@ -56,3 +57,20 @@ def test_all_shots_together_tell_a_smaller_difference() -> None:
     assert "all shots together: exposure A has 800 droplets, B 660" in told
     assert exposure_doubts([shot(40, 38)] * 100) == ()
     assert exposure_doubts([shot(40, 33)] * 20, "a") == ()
+
+
+@pytest.mark.parametrize(
+    "counts", [(0, 0, 150, 0, 0, 0), (150, 0), (80, 75, 0, 90, 85, 81, 78), (0, 120, 0, 0, 110, 0), (10, 12, 100, 9, 8)]
+)
+def test_shots_that_have_all_the_droplets_or_none_are_told(counts: tuple[int, ...]) -> None:
+    told = "; ".join(spray_doubts([shot(count, count) for count in counts]))
+    assert f"of {len(counts)} shots have 5 times more or fewer droplets than the others" in told
+
+
+def test_gusts_and_few_droplets_are_no_odd_shots() -> None:
+    rng = np.random.default_rng(0)
+    for gusts in (0.1, 0.4):
+        for mean in (2, 10, 50, 300):
+            for shots in (2, 3, 6, 12, 40):
+                counts = rng.poisson(mean * np.exp(gusts * rng.standard_normal(shots)))
+                assert spray_doubts([shot(count, count) for count in counts]) == ()

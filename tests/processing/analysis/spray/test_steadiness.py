@@ -84,6 +84,25 @@ def test_a_cone_that_changes_is_told_without_velocities_too(nozzle_moves: bool) 
     assert "seen from the nozzle droplets lie 20 degrees from the axis in the first 5 shots" in told(still)
 
 
+def _once(value: float, usual: float = 1.0) -> Callable[[int], float]:
+    return lambda shot: value if shot == 7 else usual
+
+
+@pytest.mark.parametrize(
+    ("one", "what"),
+    [
+        (sample(shots=12, half_deg=_once(35.0, 20.0)), "degrees from their axis in the other shots, 34.7"),
+        (sample(shots=12, faster=_once(1.5)), "m/s in the other shots, 22"),
+        (sample(shots=12, larger=_once(1.6)), "um in the other shots, "),
+        (sample(shots=12, nozzle_x_mm=_once(1.5, 0.0)), "mm beside the nozzle in the other shots, 1.4"),
+    ],
+)
+def test_one_shot_that_is_another_spray_is_told(one: SpraySample, what: str) -> None:
+    said = told(one)
+    assert what in said
+    assert "in one, the 8. of 12" in said
+
+
 def test_two_sprays_in_turns_are_told_with_both_angles() -> None:
     said = told(sample(half_deg=lambda shot: 30.0 if shot % 3 else 20.0))
     assert "droplets fly 20 degrees from their axis in 40 % of the shots, 30.1 in the others, in turns" in said

@@ -3,12 +3,13 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from processing.analysis.spray.spray_statistics import SprayStatistics
 from processing.runs.liquid.objects import NO_OBJECTS
 from tests.support.command_line import refused, shown, told
-from tests.support.sampled_sprays import cone_shots, in_box, write_results
+from tests.support.sampled_sprays import cone_shots, in_box, stored_shot, write_results
 
 SPRAY = '{"nozzle_mm": [0, 0, 0], "axis": [0, 1, 0]}'
 
@@ -59,6 +60,15 @@ def test_people_read_figures_with_units_and_intervals(results: Path, capsys: pyt
     assert "sample: low sample" in text
 
 
+def test_people_read_that_a_and_b_show_the_same_droplets(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = {"exposures": json.dumps({frame: {"verdict": "good", "reasons": []} for frame in "ab"})}
+    double = write_results(tmp_path / "double", cone_shots(0, 5, 60), **said)
+    assert "exposures: 10 (A and B show the same droplets)" in shown(capsys, "statistics", double)
+    assert "show the same" not in shown(capsys, "statistics", results / "monday")
+
+
 def test_people_read_what_is_doubtful_and_why_figures_are_missing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -105,6 +115,22 @@ def test_a_comparison_finds_what_differs_and_says_what_was_measured_differently(
     text = shown(capsys, "statistics", results / "monday", results / "tuesday", "--compare")
     compared_by_name = [line for line in text.splitlines() if line.startswith("tuesday / monday")]
     assert any("number density [1/mm³]" in line and "differs" in line for line in compared_by_name)
+
+
+def test_a_run_without_droplets_or_with_all_of_them_in_one_shot_is_told_beside_others(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    none = [stored_shot(np.empty(0), np.empty((0, 3)), np.empty((0, 3)), shot) for shot in range(5)]
+    empty = write_results(tmp_path / "empty", none, run="empty", spray=SPRAY)
+    once = write_results(tmp_path / "once", [*none[:4], *cone_shots(0, 5, 120)[4:]], run="once", spray=SPRAY)
+    compared = told(capsys, "statistics", results / "monday", results / "tuesday", empty, once, "--compare")
+    of_empty, of_once = compared["not_compared"]
+    count = compared["runs"]["once"]["droplets"]["n"]
+    assert of_empty == "empty: no figure of it is compared: none of its 5 exposures that count has a droplet"
+    assert of_once.startswith(f"once: no figure of it is compared: all its {count} droplets are in one shot")
+    assert compared["differences"]
+    assert "5 times more or fewer droplets" in " ".join(compared["runs"]["once"]["doubts"])
+    assert "empty: no figure of it is compared" in shown(capsys, "statistics", results / "monday", empty, "--compare")
 
 
 def test_other_pressures_are_a_difference_of_the_sprays_not_of_the_measurement(
