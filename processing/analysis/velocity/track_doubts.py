@@ -20,7 +20,9 @@ from processing.geometry import FloatArray
 from processing.volume import VoxelGrid
 
 MOST_APART = 1.5
-"""Ratio of the median speeds of the same droplets, by tracks and by both exposures of a shot."""
+"""Ratio of the median speeds of the same droplets, by tracks and by both exposures of a shot, in any direction."""
+MOST_OFF_RATE = 0.05
+"""The same along the direction in which they fly, over the speed: what is surely more is no noise."""
 LEAST_LINKED, FEWEST = 0.1, 10
 """Share of the droplets of a shot that are on tracks, and of those that are on tracks from a shot to the next one; of
 fewer droplets than so many nothing is said."""
@@ -55,19 +57,44 @@ def rate_doubts(tracks: Columns, shots: Sequence[StoredDroplets], rate_hz: float
     rate_hz : float
         Of the shots.
     """
-    speeds_m_s, paired_m_s = _speeds(tracks), _paired(tracks, shots)
-    known = np.isfinite(speeds_m_s)
+    velocities_m_s, paired_m_s = _velocities(tracks), _paired(tracks, shots)
+    known = np.isfinite(velocities_m_s).all(axis=1)
     if not known.any():
         return
-    if (median_m_s := np.median(speeds_m_s[known])) > FASTEST_M_S:
+    if (median_m_s := np.median(_amounts(velocities_m_s[known]))) > FASTEST_M_S:
         yield f"droplets fly at {median_m_s:.3g} m/s, faster than any spray: is the rate of {rate_hz:g} Hz right?"
-    if (both := known & np.isfinite(paired_m_s)).any():
-        by_tracks, by_pairs = np.median(speeds_m_s[both]), np.median(paired_m_s[both])
-        if max(by_tracks, by_pairs) > MOST_APART * min(by_tracks, by_pairs):
-            yield (
-                f"droplets fly at {by_tracks:.3g} m/s from shot to shot, but at {by_pairs:.3g} m/s from A to B: is the "
-                f"rate of {rate_hz:g} Hz right, and the separation?"
-            )
+    both = known & np.isfinite(paired_m_s).all(axis=1)
+    early = tracks["shot"] <= np.median(tracks["shot"])
+    unsure_m_s = _unsure_m_s(shots[0])
+    parts = (both, both & early, both & ~early)
+    if told := [one for part in parts if (one := _apart(velocities_m_s[part], paired_m_s[part], unsure_m_s))]:
+        by_tracks, by_pairs = told[0]
+        yield (
+            f"droplets fly at {by_tracks:.3g} m/s from shot to shot, but at {by_pairs:.3g} m/s from A to B: is the "
+            f"rate of {rate_hz:g} Hz right, are shots at even times, and is the separation right?"
+        )
+
+
+def _apart(by_tracks: FloatArray, by_pairs: FloatArray, unsure_m_s: float) -> tuple[float, float] | None:
+    """Median speeds of the same droplets by two ways, (N, 3) each, where they differ; along their direction, if any."""
+    if len(by_pairs) < FEWEST:
+        return None
+    mean_m_s = by_pairs.mean(axis=0)
+    amount_m_s = float(np.linalg.norm(mean_m_s))
+    if amount_m_s <= TOGETHER * _amounts(by_pairs).mean():
+        first, second = (float(np.median(_amounts(one))) for one in (by_tracks, by_pairs))
+        return (first, second) if max(first, second) > MOST_APART * min(first, second) else None
+    along, also = (one @ mean_m_s / amount_m_s for one in (by_tracks, by_pairs))
+    apart, second = along - also, float(np.median(also))
+    off = float(np.median(apart))
+    sd = 1.4826 * float(np.median(np.abs(apart - off))) * np.sqrt(np.pi / 2 / len(apart))
+    return (second + off, second) if abs(off) > max(MOST_OFF_RATE * second, SURE * sd, unsure_m_s) else None
+
+
+def _unsure_m_s(shot: StoredDroplets) -> float:
+    """Of a velocity from A to B, if a rig shakes; 0 where the file does not tell their separation."""
+    separation_ns, grid = stored_json(shot.provenance, "velocity").get("separation_ns"), measured_grid(shot)
+    return LEAST_JUMP_VOXEL * grid.pitch_mm * 1e6 / separation_ns if separation_ns and grid else 0.0
 
 
 def order_doubts(tracks: Columns, shots: Sequence[StoredDroplets]) -> Iterator[str]:
@@ -100,7 +127,7 @@ def still_doubts(tracks: Columns) -> Iterator[str]:
     tracks
         As of ``rate_doubts``.
     """
-    speeds_m_s = _speeds(tracks)
+    speeds_m_s = _amounts(_velocities(tracks))
     sd_m_s = np.sqrt(np.sum([np.asarray(tracks[name], np.float64) for name in VARIANCES], axis=0))
     known = np.isfinite(speeds_m_s) & np.isfinite(sd_m_s)
     if known.sum() < FEWEST:
@@ -141,7 +168,7 @@ def alone_doubts(tracks: Columns, shots: Sequence[StoredDroplets], rate_hz: floa
 
 def _common_ways_mm(tracks: Columns, rate_hz: float) -> FloatArray:
     """The shortest and longest common way (2, 3) from one shot to the next; (0, 3) where nothing moves."""
-    velocities_m_s = np.column_stack([np.asarray(tracks[name], np.float64) for name in COMPONENTS])
+    velocities_m_s = _velocities(tracks)
     flying = velocities_m_s[np.isfinite(velocities_m_s).all(axis=1)]
     return np.quantile(flying, COMMON_WAYS, axis=0) * MM_PER_M / rate_hz if len(flying) else flying
 
@@ -243,7 +270,7 @@ def _listed(numbers: NDArray[np.intp]) -> str:
 
 
 def _backwards(tracks: Columns, stated: Mapping[str, Any]) -> Iterator[str]:
-    velocities_m_s = np.column_stack([np.asarray(tracks[name], np.float64) for name in COMPONENTS])
+    velocities_m_s = _velocities(tracks)
     flying = velocities_m_s[np.isfinite(velocities_m_s).all(axis=1)]
     if not stated or not len(flying):
         return
@@ -252,16 +279,20 @@ def _backwards(tracks: Columns, stated: Mapping[str, Any]) -> Iterator[str]:
         yield "droplets fly against the axis of the spray: are shots in the order in which they were taken?"
 
 
-def _speeds(columns: Columns) -> FloatArray:
-    return np.asarray(np.linalg.norm([np.asarray(columns[name], np.float64) for name in COMPONENTS], axis=0))
+def _velocities(columns: Columns) -> FloatArray:
+    return np.column_stack([np.asarray(columns[name], np.float64) for name in COMPONENTS])
+
+
+def _amounts(velocities_m_s: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(velocities_m_s, axis=1))
 
 
 def _paired(tracks: Columns, shots: Sequence[StoredDroplets]) -> FloatArray:
-    """Speeds from A to B of the droplets on tracks; not a number where a droplet has none."""
-    speeds_m_s = np.full(len(tracks["track"]), np.nan)
+    """Velocities from A to B of the droplets on tracks, (N, 3); not a number where a droplet has none."""
+    velocities_m_s = np.full((len(tracks["track"]), 3), np.nan)
     for shot in shots:
         if COMPONENTS[0] in shot.columns:
             own: NDArray[np.bool_] = tracks["shot"] == shot.provenance["shot"]
             rows = tracks["droplet"][own].astype(np.intp)
-            speeds_m_s[own] = _speeds(shot.columns)[shot.columns["frame"] == "a"][rows]
-    return speeds_m_s
+            velocities_m_s[own] = _velocities(shot.columns)[shot.columns["frame"] == "a"][rows]
+    return velocities_m_s

@@ -149,19 +149,40 @@ def test_a_rate_that_none_can_be_is_refused(tmp_path: Path, rate_hz: float) -> N
         track_droplets(shots, rate_hz)
 
 
+def from_a_to_b(files: list[Path], step: np.ndarray, sd: float = 0.3) -> None:
+    """Give droplets velocities of so many voxels per shot, less exact than those of tracks."""
+    rng = np.random.default_rng(0)
+    for file in files:
+        stored = read_droplets(file)
+        steps = step + rng.normal(0, sd, (len(stored.columns["frame"]), 3))
+        flying = dict(zip(("u_m_s", "v_m_s", "w_m_s"), (steps * GRID.pitch_mm * RATE_HZ / 1000).T, strict=True))
+        columns = {**stored.columns, **flying, "frame": stored.columns["frame"].astype("S1")}
+        write_columns(file, columns, stored.provenance)
+
+
+@pytest.mark.parametrize(
+    ("tenths", "contradicted"),
+    [([0, 10, 20, 30, 40, 50, 60], False), ([0, 10, 20, 31, 42, 54, 66], True), ([0, 9, 18, 28, 38, 49, 60], True)],
+)
+def test_shot_times_that_drift_contradict_velocities_from_a_to_b(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], tenths: list[int], contradicted: bool
+) -> None:
+    """Each interval is some percent longer: no jump shows it, and tracks are up to 20 % too fast, or too slow first."""
+    results = write_series(tmp_path / "droplets", ordered(TENTHS, tenths), rate_hz=RATE_HZ)
+    from_a_to_b(sorted(results.glob("*.h5")), np.array([1.2, 0.6, 0.2]), 0.1)
+    doubts = told(capsys, "tracks", results, "-o", tmp_path / "tracks.h5")["doubts"]
+    assert any("are shots at even times, and is the separation right?" in one for one in doubts) == contradicted, doubts
+
+
 def test_what_contradicts_the_rate_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shown_series = series(frames=4)
     results = write_series(tmp_path / "droplets", shown_series, rate_hz=RATE_HZ)
     files = sorted(results.glob("*.h5"))
-    for file, velocities in zip(files, shown_series.frames, strict=True):
-        stored = read_droplets(file)
-        flying = dict.fromkeys(("u_m_s", "v_m_s", "w_m_s"), np.full(len(velocities), 1.2))
-        columns = {**stored.columns, **flying, "frame": stored.columns["frame"].astype("S1")}
-        write_columns(file, columns, stored.provenance)
+    from_a_to_b(files, np.array([4.0, 3.0, 1.5]))
     out = tmp_path / "tracks.h5"
     assert told(capsys, "tracks", results, "-o", out)["doubts"] == []
     (doubt,) = told(capsys, "tracks", results, "--rate-hz", RATE_HZ / 10, "-o", out, "--overwrite")["doubts"]
-    assert "m/s from A to B: is the rate of 2000 Hz right, and the separation?" in doubt
+    assert "m/s from A to B: is the rate of 2000 Hz right, are shots at even times" in doubt
     assert doubt in shown(capsys, "tracks", results, "--rate-hz", RATE_HZ / 10, "-o", out, "--overwrite")
     fast, _ = told(capsys, "tracks", results, "--rate-hz", 1000 * RATE_HZ, "-o", out, "--overwrite")["doubts"]
     assert "faster than any spray: is the rate of 2e+07 Hz right?" in fast
