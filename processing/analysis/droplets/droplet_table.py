@@ -19,6 +19,11 @@ COVARIANCES = ("xx", "xy", "xz", "yy", "yz", "zz")
 Columns = dict[str, NDArray[np.generic]]
 
 
+def sizes_of(columns: Columns) -> FloatArray:
+    """How large droplets are (N,), in um, or else how bright, by their columns: what makes two of them look alike."""
+    return np.asarray(columns["diameter_um" if "diameter_um" in columns else "amplitude"], np.float64)
+
+
 class DropletRows(Protocol):
     """Droplets of one exposure, a row each, whatever is known of them beside their place."""
 

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.droplets.droplet_file import DIAMETER, FRAME
+from processing.analysis.droplets.droplet_file import FRAME
 from processing.analysis.droplets.droplet_statistics import P_REAL
-from processing.analysis.droplets.droplet_table import Columns
+from processing.analysis.droplets.droplet_table import Columns, sizes_of
 from processing.geometry import FloatArray
 from processing.volume import VoxelGrid
 
 SURE = 0.95
 """Droplets that are more probably real tell how often real ones have a partner."""
-AMPLITUDE, PARTNER = "amplitude", "partner"
+PARTNER = "partner"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +54,8 @@ def watched(columns: Columns, grid: VoxelGrid) -> Watched:
     points_mm = np.column_stack([np.asarray(columns[name], np.float64) for name in ("x_mm", "y_mm", "z_mm")])
     first, partner = columns[FRAME].astype("U1") == "a", np.asarray(columns[PARTNER], np.intp)
     stays = staying(points_mm, first, partner, grid)
-    sizes, p_real = (
-        columns[name].astype(np.float64) for name in (DIAMETER if DIAMETER in columns else AMPLITUDE, P_REAL)
-    )
-    return Watched(np.flatnonzero(stays), sizes[stays], p_real[stays], partner[stays] >= 0)
+    p_real = columns[P_REAL].astype(np.float64)
+    return Watched(np.flatnonzero(stays), sizes_of(columns)[stays], p_real[stays], partner[stays] >= 0)
 
 
 def staying(

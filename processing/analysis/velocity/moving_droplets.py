@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.droplets.droplet_table import DropletRows, Droplets, SizedDroplets
+from processing.analysis.droplets.droplet_table import DropletRows, Droplets, SizedDroplets, sizes_of
 from processing.geometry import FloatArray
 from processing.volume import VoxelGrid
 
@@ -43,6 +43,6 @@ class MovingDroplets:
         """In voxels of a grid, from the middle of its first voxel."""
         if not isinstance(droplets, Droplets | SizedDroplets):
             raise TypeError(f"droplets of a kind that has no place in space: {type(droplets).__name__}")
-        sizes = droplets.diameters_um if isinstance(droplets, SizedDroplets) else droplets.amplitudes
         places: FloatArray = grid.to_index(droplets.points_mm)[:, ::-1]
-        return cls(places, droplets.covariance_mm2 / grid.pitch_mm**2, np.log(np.maximum(sizes, LEAST_SIZE)))
+        sizes = np.maximum(sizes_of(droplets.columns()), LEAST_SIZE)
+        return cls(places, droplets.covariance_mm2 / grid.pitch_mm**2, np.log(sizes))

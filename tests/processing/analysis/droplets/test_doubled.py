@@ -83,13 +83,14 @@ CLUSTERS = anywhere(8)[rng().integers(0, 8, 300)] + rng(6).normal(0, 6, (300, 3)
 CHAIN = np.arange(40)[:, None] * [0, 15.0, 0] + rng().normal(0, 0.5, (40, 3))
 JET = rng().normal(0, 1, (300, 3)) * [8, 150, 8]
 TWO_JETS = np.vstack([JET, JET[::-1] * [1, -1, 1] + [60, 0, 0]])
+TWO_CLUSTERS = rng(8).normal(0, 6, (40, 3)) + np.repeat([[0, 0, 0], [20, 150, 90]], 20, axis=0)
 BROKEN_IN_TWO = np.vstack([anywhere(150), anywhere(150) + rng(7).normal(0, 8, (150, 3))])
 
 
 @pytest.mark.parametrize(
     "places_voxel",
-    [np.empty((0, 3)), CLUSTERS, CHAIN, JET, TWO_JETS, BROKEN_IN_TWO],
-    ids=["none", "clusters", "chain", "jet", "two jets", "broken in two"],
+    [np.empty((0, 3)), CLUSTERS, TWO_CLUSTERS, CHAIN, JET, TWO_JETS, BROKEN_IN_TWO],
+    ids=["none", "clusters", "two clusters", "chain", "jet", "two jets", "broken in two"],
 )
 def test_sprays_that_are_not_even_are_no_copies(places_voxel: FloatArray) -> None:
     assert judged_by_copies(good(places_voxel), BOX).verdict is ShotVerdict.GOOD
@@ -114,6 +115,29 @@ def test_few_copies_are_told_where_all_are_fainter(count: int, seed: int) -> Non
     copies = places[large] + [2, 9, -1] + rng(6).normal(0, 1, (len(large), 3))
     both = np.vstack([places, copies]), np.concatenate([heights, 0.2 * heights[large]])
     assert judged_by_copies(good(*both), BOX).verdict is ShotVerdict.DOUBTFUL
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_copies_of_the_large_ones_are_told_beside_a_pair_that_is_none(seed: int) -> None:
+    """Nine of 42 droplets are large, and a weak flash shows eight of them once more; two others are as far apart."""
+    places, heights = anywhere(42, seed), rng(seed).normal(28, 2, 42)
+    heights[:9] = rng(seed).normal(75, 4, 9)
+    places[20] = places[21] + [2.5, 9, -1]
+    copies = places[:8] + [2.3, 8.9, -1.7] + rng(seed + 6).normal(0, 0.7, (8, 3))
+    both = np.vstack([places, copies]), np.concatenate([heights, heights[:8] / 6.3])
+    told = judged_by_copies(good(*both), BOX)
+    assert told.verdict is ShotVerdict.DOUBTFUL
+    assert "8 of 50 droplets are there again" in told.reasons[0]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_five_copies_that_are_fainter_by_the_same_factor_are_told(seed: int) -> None:
+    places, heights = anywhere(34, seed), rng(seed).lognormal(0, 0.9, 34)
+    large = np.argsort(-heights)[:5]
+    copies = places[large] + [2, 9, -1] + rng(seed + 6).normal(0, 0.5, (5, 3))
+    dim = 0.09 * heights[large] * rng(seed).normal(1, 0.1, 5)
+    told = judged_by_copies(good(np.vstack([places, copies]), np.concatenate([heights, dim])), BOX)
+    assert told.verdict is ShotVerdict.DOUBTFUL
 
 
 @pytest.mark.parametrize("places_voxel", [anywhere(15), anywhere(60), anywhere(400), CLUSTERS, JET, TWO_JETS])
