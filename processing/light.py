@@ -249,9 +249,15 @@ def _full_share(frame: Frame, most: np.float32) -> float:
     full, highest = float(np.mean(frame > FULL * most)), int(frame.max(initial=0))
     if full > SATURATED_SHARE or highest < LEAST_FULL * most:
         return full
-    brightest = frame[frame >= highest - BELOW]
-    counts = np.bincount(brightest.astype(np.intp) - (highest - BELOW))
-    return float(counts[-1]) / frame.size if counts[-1] > PILED * counts[:-1].max() else full
+    return float(np.mean(frame == highest)) if piles_up(frame) else full
+
+
+def piles_up(frame: Frame) -> bool:
+    """Whether a camera is full at the highest grey value of a frame: light has noise, and its highest value a few."""
+    highest = int(frame.max(initial=0))
+    brightest = frame[frame >= highest - BELOW].astype(np.int64) - (highest - BELOW)
+    counts = np.bincount(brightest, minlength=BELOW + 1)
+    return bool(counts[-1] > PILED * counts[:-1].max())
 
 
 def _unknown(background: Intensity, dark: Intensity | None, bits: int) -> str:

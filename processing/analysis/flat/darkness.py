@@ -93,6 +93,7 @@ def darkness_of(
     if rows_alternate(image):
         raise LightError(ALTERNATING)
     grey = np.asarray(image, np.float32)
+    _require_unprocessed(grey)
     rows, columns = _without_frame(grey)
     inner, full = grey[rows, columns], (_at_full_scale(grey) if saturated is None else saturated)[rows, columns]
     light = _fitted(inner) if background is None else _given(inner, np.asarray(background, np.float32)[rows, columns])
@@ -107,6 +108,15 @@ def darkness_of(
     noise = 1.4826 * float(np.median(np.abs(free - np.median(free)))) if free.size else 0.0
     _require_known(values, noise, polarity, fitted=background is None)
     return Darkness(values.astype(np.float32), rows.start or 0, columns.start or 0, noise, full)
+
+
+def _require_unprocessed(grey: Image) -> None:
+    """Refuse what is left of an image once a threshold was set: edges lie where it says, and nobody knows it."""
+    if np.all((grey == grey.min()) | (grey == grey.max())) and grey.min() < grey.max():
+        raise LightError(
+            "has 2 grey values: whoever set the threshold between them has set all sizes; give the image as the camera "
+            "has it"
+        )
 
 
 def _at_full_scale(grey: Image) -> NDArray[np.bool_]:

@@ -1,24 +1,21 @@
 """Droplets of a single image: where in the image, how large, how sharp. In pixels; no depth, no volume."""
 
 from collections import Counter
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, FiniteFloat
 
 from processing.analysis.flat.blurred_disc import LEVELS, flattening, unblurred
 from processing.analysis.flat.darkness import Darkness, Image, darkness_of
-from processing.analysis.flat.discs_in_outline import Disc, discs_in
+from processing.analysis.flat.flat_settings import FlatSettings
+from processing.analysis.flat.judged_spots import LeftOut, MeasuredSpot, SeenSpot, judged_spot
 from processing.analysis.flat.outline import Outline, outline_around
 from processing.analysis.flat.spots import Spot, find_spots
 from processing.analysis.flat.whole_share import whole_shares
 from processing.geometry import FloatArray
 from processing.grey_image import require_image
-from processing.preprocessing import Polarity
-from processing.reconstruction.settings import FrozenValue
 
 ROUNDS = 3
 """Of the light around a droplet and its outline, which depend on one another."""
@@ -28,26 +25,6 @@ MOST_SATURATED = 0.05
 """Share of the area of a bright particle; a Gaussian one whose height is clipped there is 3 % too large."""
 SMOOTHED_NOISE = 1 / 3
 """Of the noise of a pixel, in the mean of 3 x 3."""
-
-
-class FlatSettings(FrozenValue):
-    """How droplets of single images are measured; travels with every result."""
-
-    polarity: Annotated[Polarity, Field(description="dark droplets before light, or bright particles on black")] = (
-        "shadow"
-    )
-    least_depth: Annotated[
-        float, Field(gt=0, lt=1, description="darkness, relative to the light, that a droplet stands out by")
-    ] = 0.2
-    least_diameter_px: Annotated[FiniteFloat, Field(ge=2, description="smaller ones are dust, or cannot be sized")] = (
-        4.0
-    )
-    least_circularity: Annotated[
-        float, Field(gt=0, lt=1, description="4 pi area / perimeter^2; below, it is a ligament, or several droplets")
-    ] = 0.8
-    most_blur: Annotated[
-        float, Field(gt=0, le=0.8, description="blur over radius; above, it is too far out of focus to be sized")
-    ] = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +54,8 @@ class FlatDroplets:
         What was seen and is not among them: ``border``, ``not_round``, ``unsharp``, ``small``, ``saturated``.
     image_size_px : int, int
         Columns and rows of the image.
+    lacking_px : (M,) array
+        About how large those are that were left out as ``unsharp`` or ``small``.
     """
 
     centres_px: FloatArray
@@ -89,6 +68,7 @@ class FlatDroplets:
     whole_shares: FloatArray
     left_out: dict[str, int]
     image_size_px: tuple[int, int] = (0, 0)
+    lacking_px: FloatArray = field(default_factory=lambda: np.empty(0))
 
     @classmethod
     def none(cls) -> "FlatDroplets":
@@ -112,23 +92,6 @@ class FlatDroplets:
             "overlapping": self.overlapping.astype(np.uint8),
             "whole_share": self.whole_shares,
         }
-
-
-@dataclass(frozen=True)
-class _Measured:
-    """A droplet: column, row, diameter, raw diameter, blur, depth, circularity, overlapping."""
-
-    row: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """A spot with its outline at half depth, radii at all levels, depth, and whether another shadow reaches into it."""
-
-    outline: Outline
-    radii_px: tuple[float, float, float]
-    depth: float
-    disturbed: bool
 
 
 def measure_flat(
@@ -168,8 +131,9 @@ def measure_flat(
     least = max(how.least_depth, NOISES * SMOOTHED_NOISE * seen.noise)
     spots = find_spots(smoothed, 0.5 * least, least)
     results = _measured_once(seen, smoothed, spots, how, least)
-    left_out = Counter(result for result in results if isinstance(result, str))
-    rows = [result.row for result in results if isinstance(result, _Measured)]
+    lacking = [result for result in results if isinstance(result, LeftOut)]
+    sized_px = np.array([one.diameter_px for one in lacking if one.diameter_px is not None], np.float64)
+    rows = [result.row for result in results if isinstance(result, MeasuredSpot)]
     table = np.array(rows, dtype=np.float64).reshape(-1, 8)
     return FlatDroplets(
         centres_px=table[:, :2] + (seen.first_column, seen.first_row),
@@ -180,31 +144,32 @@ def measure_flat(
         circularity=table[:, 6],
         overlapping=table[:, 7] > 0,
         whole_shares=whole_shares(table[:, 2], seen.values.shape),
-        left_out=dict(left_out),
+        left_out=dict(Counter(one.reason for one in lacking)),
+        lacking_px=sized_px,
         image_size_px=(np.shape(image)[1], np.shape(image)[0]),
     )
 
 
 def _measured_once(
     seen: Darkness, smoothed: Image, spots: list[Spot], how: FlatSettings, least: float
-) -> list[_Measured | str]:
+) -> list[MeasuredSpot | LeftOut]:
     """All spots; one whose outline goes around a spot that was measured already is part of that."""
-    results: list[_Measured | str] = []
+    results: list[MeasuredSpot | LeftOut] = []
     taken: set[tuple[int, int]] = set()
     for spot in spots:
         found = _outlined(seen.values, smoothed, spot, least)
-        if isinstance(found, str):
+        if isinstance(found, LeftOut):
             results.append(found)
         elif found is not None and how.polarity == "bright" and _saturated(found.outline, seen.saturated):
-            results.append("saturated")
+            results.append(LeftOut("saturated"))
         elif found is not None:
             row, column = (round(coordinate) for coordinate in found.outline.centre_px)
-            results += [] if (row, column) in taken else _judged(found, how)
+            results += [] if (row, column) in taken else judged_spot(found, how)
             taken.add((row, column))
     return results
 
 
-def _outlined(values: Image, smoothed: Image, spot: Spot, least: float) -> _Seen | str | None:
+def _outlined(values: Image, smoothed: Image, spot: Spot, least: float) -> SeenSpot | LeftOut | None:
     """What is seen of a spot; ``border`` where that goes on beyond the image, None where it does not stand out."""
     light = 0.0
     for _ in range(ROUNDS):
@@ -216,23 +181,23 @@ def _outlined(values: Image, smoothed: Image, spot: Spot, least: float) -> _Seen
             break
         middle = _outline(values, light + LEVELS[1] * depth, spot)
         if middle is None:
-            return "border"
+            return LeftOut("border")
         light = _light_around(smoothed, middle, light)
     disturbed = merged or max(light, spot.base - light) > LEVELS[0] * depth
     first = _at_levels(values, light, depth, spot, disturbed)
     if first is None:
-        return "border"
+        return LeftOut("border")
     return _at_levels(values, light, depth / flattening(*unblurred(first.radii_px)), spot, disturbed) or first
 
 
-def _at_levels(values: Image, light: float, depth: float, spot: Spot, disturbed: bool) -> _Seen | None:
+def _at_levels(values: Image, light: float, depth: float, spot: Spot, disturbed: bool) -> SeenSpot | None:
     """Outlines of a spot; the outer one is mirrored from the inner one where something else is in the way."""
     outer, middle, inner = (_outline(values, light + level * depth, spot) for level in LEVELS)
     if middle is None:
         return None
     half_px, inner_px = middle.radius_px, (inner or middle).radius_px
     outer_px = 2 * half_px - inner_px if disturbed or outer is None else outer.radius_px
-    return _Seen(middle, (outer_px, half_px, inner_px), depth, disturbed)
+    return SeenSpot(middle, (outer_px, half_px, inner_px), depth, disturbed)
 
 
 def _outline(values: Image, level: float, spot: Spot) -> Outline | None:
@@ -267,22 +232,3 @@ def _saturated(outline: Outline, saturated: NDArray[np.bool_]) -> bool:
     (top, left), (bottom, right) = outline.points.min(axis=0), outline.points.max(axis=0)
     within = saturated[int(top) : int(bottom) + 2, int(left) : int(right) + 2]
     return int(np.count_nonzero(within)) > MOST_SATURATED * outline.area_px2
-
-
-def _judged(seen: _Seen, how: FlatSettings) -> list[_Measured | str]:
-    circularity, raw_px = min(seen.outline.circularity, 1.0), 2 * seen.outline.radius_px
-    if raw_px < how.least_diameter_px:
-        return ["small"]
-    if circularity < how.least_circularity:
-        discs = discs_in(seen.outline)
-        return [_overlapping(disc, seen.depth, circularity) for disc in discs] or ["not_round"]
-    radius_px, blur_px = unblurred(seen.radii_px)
-    if blur_px > how.most_blur * radius_px:
-        return ["unsharp"]
-    row, column = seen.outline.centre_px
-    return [_Measured((column, row, 2 * radius_px, raw_px, blur_px, seen.depth, circularity, float(seen.disturbed)))]
-
-
-def _overlapping(disc: Disc, depth: float, circularity: float) -> _Measured:
-    diameter_px = 2 * disc.radius_px
-    return _Measured((disc.column, disc.row, diameter_px, diameter_px, np.nan, depth, circularity, 1.0))

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_file import FRAME, StoredDroplets, write_columns
 from processing.analysis.droplets.size_statistics import mean_diameters
 from processing.analysis.flat.darkness import LightError
-from processing.analysis.flat.flat_droplets import FlatDroplets, FlatSettings, measure_flat
+from processing.analysis.flat.flat_doubts import chosen_by_size, crowded, flat_doubts
+from processing.analysis.flat.flat_droplets import FlatDroplets, measure_flat
+from processing.analysis.flat.flat_settings import FlatSettings
 from processing.analysis.flat.repeated import Discs, counted_twice
 from processing.analysis.stored_json import stored_json
 from processing.errors import BadInput
@@ -28,13 +30,6 @@ COMMAND, METHOD_VERSION = "measure-single-view", 2
 Verdict = Literal["good", "doubtful", "empty", "refused"]
 WORST: tuple[Verdict, ...] = ("refused", "doubtful", "good", "empty")
 """Of the exposures of a shot the first one of these is that of the shot."""
-MOST_CROWDED, FEWEST_CROWDED = 0.2, 5
-"""Share of the shadows that may overlap others, or be no discs; fewer than five are chance. Of simulated sprays of 14
-to 30 px with 20 % of them D32 is 2 to 4 % wrong, with 30 to 55 % up to 9 %: two look like one, large ones are lost."""
-MOST_SATURATED = 0.05
-"""Of the bright particles."""
-LEAST_MEASURED = 0.5
-"""Of the droplets that are seen whole: of fewer, means are those of a choice that size and sharpness have made."""
 
 
 class FlatShot(FrozenValue):
@@ -128,13 +123,26 @@ def unlike_image_sizes(images: Mapping[str, StoredDroplets]) -> tuple[str, ...]:
     )
 
 
-def crowded(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
-    """Why shots together are doubted, of which each may have too few shadows to say that many overlap."""
+def doubts_together(shots: Sequence[StoredDroplets], um_per_px: float | None) -> tuple[str, ...]:
+    """Why shots together are doubted, of which each may have too few shadows to say it.
+
+    Parameters
+    ----------
+    shots : sequence of StoredDroplets
+        Of one measurement.
+    um_per_px : float | None
+        Width of a pixel, where columns are in um.
+    """
+    unit, scale = ("px", 1.0) if um_per_px is None else ("um", um_per_px)
     told = [one for shot in shots for one in stored_json(shot.provenance, "exposures").values()]
     overlapping = sum(int(np.count_nonzero(shot.columns["overlapping"])) for shot in shots)
     clumps = sum(one["left_out"].get("not_round", 0) for one in told)
-    doubt = _crowded(overlapping, clumps, sum(one["droplets"] for one in told))
-    return (doubt,) if doubt else ()
+    sizes_px = (
+        np.concatenate([np.empty(0), *(np.asarray(one.columns[f"diameter_{unit}"], float) for one in shots)]) / scale
+    )
+    lacking_px = np.array([size for one in told for size in one.get("lacking_px", ())], np.float64)
+    doubts = (crowded(overlapping, clumps, len(sizes_px)), chosen_by_size(sizes_px, lacking_px))
+    return tuple(doubt for doubt in doubts if doubt)
 
 
 def droplets_twice(images: Mapping[str, StoredDroplets], um_per_px: float | None) -> tuple[str, ...]:
@@ -171,54 +179,11 @@ def _told(found: FlatDroplets | BadInput) -> dict[str, Any]:
     unmeasured = {"residual_over_noise": None}
     if isinstance(found, BadInput):
         return {"verdict": "refused", "reasons": [str(found)], "droplets": 0, "left_out": {}, **unmeasured}
-    doubts = _doubts(found)
+    doubts = flat_doubts(found)
     verdict = "empty" if not len(found) else "doubtful" if doubts else "good"
     told = {"droplets": len(found), "left_out": found.left_out, "image_size_px": found.image_size_px}
-    return {"verdict": verdict, "reasons": doubts, **told, **unmeasured}
-
-
-def _doubts(found: FlatDroplets) -> list[str]:
-    """Why means are not those of the spray."""
-    overlapping = int(np.count_nonzero(found.overlapping))
-    doubts = (
-        _unmeasured(found),
-        _saturated(found),
-        _crowded(overlapping, found.left_out.get("not_round", 0), len(found)),
-    )
-    return [doubt for doubt in doubts if doubt]
-
-
-def _unmeasured(found: FlatDroplets) -> str:
-    """Most of what is seen whole was not measured."""
-    lacking = {reason: number for reason, number in found.left_out.items() if reason != "border"}
-    seen = len(found) + sum(lacking.values())
-    if len(found) >= LEAST_MEASURED * seen:
-        return ""
-    why = ", ".join(f"{number} {reason.replace('_', ' ')}" for reason, number in lacking.items())
-    return f"{len(found)} of {seen} shadows are measured ({why}): means are of those, not of the spray"
-
-
-def _saturated(found: FlatDroplets) -> str:
-    """Bright particles are left out as nobody knows how bright they are: hardly the smallest ones."""
-    lacking, seen = found.left_out.get("saturated", 0), len(found) + found.left_out.get("saturated", 0)
-    if lacking <= MOST_SATURATED * seen:
-        return ""
-    return (
-        f"{lacking} of {seen} particles, limit {100 * MOST_SATURATED:.0f} %, are at the camera's full scale and not "
-        "measured: where they are half as bright is unknown, and means are of the fainter ones; take less light"
-    )
-
-
-def _crowded(overlapping: int, clumps: int, measured: int) -> str:
-    """Shadows lie over one another: so many were told apart, and of so many clumps nobody knows what they hold."""
-    crowd, seen = overlapping + clumps, measured + clumps
-    if crowd < FEWEST_CROWDED or crowd <= MOST_CROWDED * seen:
-        return ""
-    return (
-        f"{crowd} of {seen} shadows, limit {100 * MOST_CROWDED:.0f} %, overlap others or are no discs ({clumps} are "
-        "left out, each of which may hold several droplets): two that lie over each other look like one, large ones "
-        "are lost, and means may be 10 % wrong; measure farther from the nozzle, or with less depth"
-    )
+    lacking_px = [round(size_px, 2) for size_px in found.lacking_px.tolist()]
+    return {"verdict": verdict, "reasons": doubts, **told, "lacking_px": lacking_px, **unmeasured}
 
 
 def _columns(found: Mapping[str, FlatDroplets | BadInput], um_per_px: float | None) -> dict[str, NDArray[np.generic]]:

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.files.run_directory import RunReader
+from processing.analysis.flat.darkness import FULL_SCALES
 from processing.calibration.calibration_file import file_sha256
-from processing.image_file import read_image
-from processing.light import FULL
+from processing.image_file import GreyImage, read_image
+from processing.light import FULL, LEAST_FULL, piles_up
 from processing.preprocessing import Frame, Intensity
 from processing.runs.errors import PipelineError
 from processing.runs.results_file import Provenance
@@ -130,10 +131,16 @@ def _view(run: RunReader, view: str | None) -> str:
 
 
 def _of_image(path: Path, background: Path | None) -> Mapping[str, Exposure]:
-    grey = read_image(path).astype(np.float32)
-    if background is None:
-        return {"a": (grey, None, None)}
-    light = read_image(background).astype(np.float32)
-    if light.shape != grey.shape:
+    grey, light = read_image(path), None if background is None else read_image(background)
+    if light is not None and light.shape != grey.shape:
         raise PipelineError(f"{background}: has shape {light.shape}, {path.name} has {grey.shape}")
-    return {"a": (grey, light, None)}
+    saturated = _full(grey) if light is None else _full(grey) | _full(light)
+    return {"a": (grey.astype(np.float32), None if light is None else light.astype(np.float32), saturated)}
+
+
+def _full(grey: GreyImage) -> NDArray[np.bool_]:
+    """Pixels at the end of the camera's scale, or where they pile up not far below that of 8 to 16 bits."""
+    highest = int(grey.max(initial=0))
+    scale = next(most for most in sorted(FULL_SCALES) if most >= highest)
+    at_end = highest == scale or (highest >= LEAST_FULL * scale and piles_up(grey))
+    return grey == highest if at_end else np.zeros(grey.shape, np.bool_)

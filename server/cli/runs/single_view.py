@@ -17,7 +17,7 @@ from server.reports.digits import digits_of_interval
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from processing.analysis.flat.flat_droplets import FlatSettings
+    from processing.analysis.flat.flat_settings import FlatSettings
     from processing.preprocessing import Polarity
     from processing.runs.results_file import Provenance
     from processing.runs.single_view.measurement import FlatShot
@@ -56,7 +56,7 @@ def measure_single_view(options: Namespace) -> Outcome:
     PipelineError
         Images and runs at once, or options that need a calibration.
     """
-    from processing.analysis.flat.flat_droplets import FlatSettings
+    from processing.analysis.flat.flat_settings import FlatSettings
     from processing.runs.single_view.measurement import COMMAND, METHOD_VERSION
     from processing.runs.single_view.sources import image_origin, image_sources
 
@@ -166,7 +166,7 @@ def _result(
     from processing.runs.single_view.measurement import (
         COMMAND,
         METHOD_VERSION,
-        crowded,
+        doubts_together,
         droplets_twice,
         flat_statistics,
         unlike_image_sizes,
@@ -177,7 +177,7 @@ def _result(
     stored = {shot.image or f"shot {shot.shot}": read_droplets(out / shot.file) for shot in shots}
     doubts = (
         *droplets_twice(stored, options.um_per_px),
-        *crowded(list(stored.values())),
+        *doubts_together(list(stored.values()), options.um_per_px),
         *unlike_image_sizes(stored),
         *scale_doubts(options.um_per_px, by_rig_um_per_px),
     )

@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from processing.analysis.flat.darkness import LightError
-from processing.analysis.flat.flat_droplets import FlatDroplets, FlatSettings, measure_flat
+from processing.analysis.flat.flat_droplets import FlatDroplets, measure_flat
+from processing.analysis.flat.flat_settings import FlatSettings
 from processing.errors import BadInput
 from processing.preprocessing import Polarity
 from tests.support.flat_scenes import LIGHT, SHAPE, Disc, shadow

@@ -1,0 +1,80 @@
+"""Why mean diameters of single images are not those of the spray: what was seen and not measured, and what overlaps."""
+
+import numpy as np
+
+from processing.analysis.flat.flat_droplets import FlatDroplets
+from processing.geometry import FloatArray
+
+MOST_CROWDED, FEWEST_CROWDED = 0.2, 5
+"""Share of the shadows that may overlap others, or be no discs; fewer than five are chance. Of simulated sprays of 14
+to 30 px with 20 % of them D32 is 2 to 4 % wrong, with 30 to 55 % up to 9 %: two look like one, large ones are lost."""
+MOST_SATURATED = 0.05
+"""Of the bright particles."""
+LEAST_MEASURED = 0.5
+"""Of the droplets that are seen whole: of fewer, means are those of a choice that size and sharpness have made."""
+MOST_LARGER, FEWEST_LACKING = 0.03, 3
+"""So much larger than that of all may the mean diameter of those be that are measured; fewer lacking ones are dust."""
+
+
+def flat_doubts(found: FlatDroplets) -> list[str]:
+    """Why means of an image are not those of the spray."""
+    overlapping = int(np.count_nonzero(found.overlapping))
+    doubts = (
+        _unmeasured(found) or chosen_by_size(found.diameters_px, found.lacking_px),
+        _saturated(found),
+        crowded(overlapping, found.left_out.get("not_round", 0), len(found)),
+    )
+    return [doubt for doubt in doubts if doubt]
+
+
+def chosen_by_size(measured_px: FloatArray, lacking_px: FloatArray) -> str:
+    """Mostly small droplets are too small, or not sharp enough, to be sized: means are of the others.
+
+    Parameters
+    ----------
+    measured_px, lacking_px : (N,), (M,) array
+        Diameters of droplets that are measured, and about those of the others that are seen.
+    """
+    if len(lacking_px) < FEWEST_LACKING or not len(measured_px):
+        return ""
+    larger = float(measured_px.mean() / np.concatenate([measured_px, lacking_px]).mean()) - 1
+    if larger <= MOST_LARGER:
+        return ""
+    return (
+        f"{len(lacking_px)} of {len(lacking_px) + len(measured_px)} droplets are unsharp or too small to be sized, and "
+        f"mostly small ones: D10 is about {100 * larger:.0f} % too large for what is seen, limit "
+        f"{100 * MOST_LARGER:.0f} %; focus, take shorter pulses or more magnification"
+    )
+
+
+def _unmeasured(found: FlatDroplets) -> str:
+    """Most of what is seen whole was not measured."""
+    lacking = {reason: number for reason, number in found.left_out.items() if reason != "border"}
+    seen = len(found) + sum(lacking.values())
+    if len(found) >= LEAST_MEASURED * seen:
+        return ""
+    why = ", ".join(f"{number} {reason.replace('_', ' ')}" for reason, number in lacking.items())
+    return f"{len(found)} of {seen} shadows are measured ({why}): means are of those, not of the spray"
+
+
+def _saturated(found: FlatDroplets) -> str:
+    """Bright particles are left out as nobody knows how bright they are: hardly the smallest ones."""
+    lacking, seen = found.left_out.get("saturated", 0), len(found) + found.left_out.get("saturated", 0)
+    if lacking <= MOST_SATURATED * seen:
+        return ""
+    return (
+        f"{lacking} of {seen} particles, limit {100 * MOST_SATURATED:.0f} %, are at the camera's full scale and not "
+        "measured: where they are half as bright is unknown, and means are of the fainter ones; take less light"
+    )
+
+
+def crowded(overlapping: int, clumps: int, measured: int) -> str:
+    """Shadows lie over one another: so many were told apart, and of so many clumps nobody knows what they hold."""
+    crowd, seen = overlapping + clumps, measured + clumps
+    if crowd < FEWEST_CROWDED or crowd <= MOST_CROWDED * seen:
+        return ""
+    return (
+        f"{crowd} of {seen} shadows, limit {100 * MOST_CROWDED:.0f} %, overlap others or are no discs ({clumps} are "
+        "left out, each of which may hold several droplets): two that lie over each other look like one, large ones "
+        "are lost, and means may be 10 % wrong; measure farther from the nozzle, or with less depth"
+    )
