@@ -12,9 +12,10 @@ import numpy as np
 
 from processing.analysis.droplets.droplet_file import DIAMETER, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import REFUSED
+from processing.analysis.droplets.droplet_table import sizes_of
 from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS
 from processing.analysis.droplets.shadows.shadow_light import unlike_discs
-from processing.analysis.droplets.verdicts.cut_sizes import complete_from_um, cut_off
+from processing.analysis.droplets.verdicts.cut_sizes import AMPLITUDES, DIAMETERS, complete_from, cut_off
 from processing.analysis.droplets.verdicts.elongation import WRONG, Elongation, elongation_told
 from processing.analysis.stored_json import stored_json
 from processing.analysis.unlike_sizes import FEWEST, LEAST_P_PAIR, LONGEST_NS, common_share, unlike_told
@@ -29,21 +30,23 @@ def few_together(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
     sized = [shot for shot in shots if {DIAMETER, SD, RESIDUAL} <= shot.columns.keys()]
     told = (_shapes(sized), _sizes(sized))
     few = (f"shots with few droplets together: {what}" for what in told if what)
-    of_all = (f"{length}{WRONG if is_wrong else ''}" if length else "", _smallest(sized))
+    of_all = (f"{length}{WRONG if is_wrong else ''}" if length else "", _smallest(shots))
     return (*few, *(f"all shots together: {what}" for what in of_all if what))
 
 
 def _smallest(shots: Sequence[StoredDroplets]) -> str:
     """Of exposures A: B shows the same droplets, and makes nothing surer."""
-    first = [np.asarray(shot.columns[DIAMETER], np.float64)[shot.columns["frame"] == "a"] for shot in shots]
-    limits_um = [np.full(len(its_um), _limit_um(shot)) for shot, its_um in zip(shots, first, strict=True)]
-    return cut_off(np.concatenate([np.empty(0), *first]), np.concatenate([np.empty(0), *limits_um]))
+    first = [sizes_of(shot.columns)[shot.columns["frame"] == "a"] for shot in shots]
+    limits = [np.full(len(its), found_from(shot)) for shot, its in zip(shots, first, strict=True)]
+    below = DIAMETERS if all(DIAMETER in shot.columns for shot in shots) else AMPLITUDES
+    return cut_off(np.concatenate([np.empty(0), *first]), np.concatenate([np.empty(0), *limits]), below)
 
 
-def _limit_um(shot: StoredDroplets) -> float:
-    """From where on the droplets of its exposure A are found; 0 where its file does not tell."""
+def found_from(shot: StoredDroplets) -> float:
+    """Diameter in um, or amplitude, from which on droplets of its exposure A are found; 0: its file does not tell."""
     views = stored_json(shot.provenance, "exposures").get("a", {}).get("views", {})
-    return complete_from_um([view.get("complete_from_um", 0.0) for view in views.values()])
+    name = "complete_from_um" if DIAMETER in shot.columns else "complete_from"
+    return complete_from([view.get(name, 0.0) for view in views.values()])
 
 
 def _views(shots: Sequence[StoredDroplets]) -> list[Elongation]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict
+from statistics import fmean
 
 from daq.files.run_directory import RunHeader
 from processing.analysis.two_exposures.alone_droplets import MOST_ALONE, REMEDY
@@ -144,6 +145,21 @@ def stated_rate(rate_hz: float) -> Unchecked:
         "in proportion, and accelerations by its square; only velocities from A to B would contradict it",
         "rate_hz as the trigger has it, by a counter; double exposures with a separation tell velocities of their own",
     )
+
+
+def below(polarity: Polarity, found_from: Sequence[float]) -> list[Unchecked]:
+    """Of bright particles too faint to be seen; of each shot the amplitude from which on they are found, 0: unknown."""
+    known = [limit for limit in found_from if limit > 0]
+    if polarity != "bright" or not known:
+        return []
+    return [
+        Unchecked(
+            f"whether there are droplets fainter than {fmean(known):.2g} of full scale: from there on nearly all are "
+            "found, and none below a half of it. Where they are a class of their own, which noise hides, number "
+            "density lacks them",
+            "nothing where droplets are alike; else more light, or less noise: fewer are missing then",
+        )
+    ]
 
 
 def unlike_motions(shares_alone: Sequence[float]) -> list[Unchecked]:

@@ -206,10 +206,9 @@ def _result(
     from processing.analysis.copied_shots import copies_told
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.droplets.droplet_statistics import droplet_statistics
-    from processing.analysis.even_rows import row_spacing_mm
     from processing.analysis.few_together import few_together
     from processing.analysis.lingering_droplets import lingering_told
-    from processing.analysis.near_or_far import depth_doubts, sights_of
+    from processing.analysis.near_or_far import depth_doubts
     from processing.analysis.velocity.velocity_statistics import velocity_statistics
     from processing.runs.droplets.measure_settings import METHOD_VERSION
     from processing.runs.liquid.objects import liquid_summary
@@ -227,9 +226,7 @@ def _result(
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "grid": settings.model_dump(mode="json")["grid"],
         "shots": [shot.model_dump(mode="json") for shot in shots],
-        "not_checked": tell_unchecked(
-            options.calibration, run_dir, settings, shots, sights_of(stored), row_spacing_mm(stored)
-        ),
+        "not_checked": tell_unchecked(options.calibration, run_dir, settings, shots, stored),
         "statistics": droplet_statistics(stored).model_dump(mode="json"),
         "velocity": velocity_statistics(stored).model_dump(mode="json"),
         **liquid_summary(stored).model_dump(mode="json"),

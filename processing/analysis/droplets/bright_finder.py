@@ -28,6 +28,12 @@ LEAST_GAIN = 0.003
 PRUNE_FIRST, PRUNE_LAST = 0.08, 0.1
 """Droplets below so many median amplitudes are dropped, at the first and at the last threshold. At the last, 0.3 would
 lose one or two of a hundred droplets whose amplitudes spread as exp(N(0, 0.5))."""
+LEAST_LEFT = 0.03
+"""Spots from so many median amplitudes on are looked for in what droplets leave, and counted as missing: what makes
+droplets no round Gaussians leaves less."""
+COMPLETE, SHARP_POWER = 2.0, 1.5
+"""So many times brighter than the faintest that is told nearly all droplets are found; of spots that are narrower than
+a pixel, over the power of their width, as candidates stand a little beside them: see ``verdicts.cut_sizes``."""
 NOISE_SIGMAS = 5.0
 """No droplet is fainter than so many standard deviations of its amplitude."""
 SEEN_FROM_ASIDE = 0.6
@@ -73,6 +79,16 @@ class BrightFit:
         return NOISE_SIGMAS * self.optics.amplitude_sigma
 
     @property
+    def told_from(self) -> float:
+        """Amplitude of the faintest droplet that is told."""
+        return max(PRUNE_LAST * self.scale, self.faintest)
+
+    @property
+    def complete_from(self) -> float:
+        """Amplitude from which on nearly all droplets are found."""
+        return COMPLETE * self.told_from / float(min(1.0, rms_of(self.optics.sigmas_px)) ** SHARP_POWER)
+
+    @property
     def allowed(self) -> FloatArray:
         """Root mean square that may be left of the images (K,): their noise, which is 1, or what the model is off."""
         return np.maximum(1.0, MODEL_SHARE * self.scale * self.optics.gains)
@@ -112,6 +128,24 @@ def find_bright(shot: BlobImages, search: DropletSearch, before_round: Callable[
         known = len(fit.blobs)
         fit, purges, number = _fitted(shot, purged), purges - 1, FALLING_ROUNDS // 4
     return _finished(shot, fit)
+
+
+def fainter(shot: BlobImages, search: DropletSearch, fit: BrightFit) -> Blobs:
+    """Spots that all views see beside the droplets, fainter than any that is told; none where noise hides them.
+
+    Parameters
+    ----------
+    shot, search : BlobImages, DropletSearch
+        As they were searched.
+    fit : BrightFit
+        What was found: it stays as it is.
+    """
+    least = max(LEAST_LEFT * fit.scale, fit.faintest)
+    if least >= fit.told_from:
+        return Blobs.none()
+    residuals = shot.residuals(fit.optics, fit.blobs)
+    dark = replace(fit, blobs=Blobs.none().joined_by(_new_places(shot, search, fit, residuals, least)))
+    return merged(_fitted(shot, dark, residuals=residuals).brighter_than(least).blobs, APART_VOXEL)
 
 
 def _round(shot: BlobImages, search: DropletSearch, fit: BrightFit, number: int) -> tuple[BrightFit, float]:
@@ -167,7 +201,7 @@ def _finished(shot: BlobImages, fit: BrightFit) -> BrightFit:
     if len(fit.blobs):
         fit = replace(fit, optics=refined_optics(shot, fit.optics, fit.blobs, shifts=True))
         fit = _fitted(shot, fit, sweeps=FINAL_SWEEPS, tolerance=FINAL_TOLERANCE)
-    return fit.brighter_than(max(PRUNE_LAST * fit.scale, fit.faintest))
+    return fit.brighter_than(fit.told_from)
 
 
 def rms(images: Sequence[Image]) -> float:

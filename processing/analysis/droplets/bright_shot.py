@@ -6,16 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.droplets.bright_finder import MODEL_SHARE, BrightFit, find_bright, rms, rms_of
+from processing.analysis.droplets.bright_finder import MODEL_SHARE, BrightFit, fainter, find_bright, rms, rms_of
 from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
 from processing.analysis.droplets.droplet_table import Droplets
-from processing.analysis.droplets.gaussian_blobs import BlobImages, BlobOptics, Blobs, Image
-from processing.analysis.droplets.ghost_share import GhostShare, pooled
+from processing.analysis.droplets.gaussian_blobs import BlobImages, Blobs, Image
+from processing.analysis.droplets.ghost_share import GhostShare, is_told, pooled
 from processing.analysis.droplets.image_noise import noise_of
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict, told_real
-from processing.analysis.droplets.reality import Evidence, Reality, crowding, twins_of
+from processing.analysis.droplets.reality import Evidence, Reality, crowding
 from processing.analysis.droplets.verdicts.blind_views import blind_verdict, check_images
 from processing.analysis.droplets.verdicts.companions import judged_by_company
+from processing.analysis.droplets.verdicts.cut_sizes import judged_by_fainter, judged_by_smallest
 from processing.analysis.droplets.verdicts.doubled import judged_by_copies
 from processing.analysis.droplets.verdicts.explained_images import RatioLimits, judged
 from processing.analysis.droplets.verdicts.hidden_volume import judged_by_volume
@@ -45,6 +46,9 @@ class SeenView:
         Width of droplets along columns and rows.
     shift_u_px, shift_v_px : float
         How far the image lies beside its calibration, apart from a common motion of all.
+    complete_from : float
+        Amplitude from which on nearly all droplets are found, the same for all views: half of it is told, where that is
+        a tenth of a typical one and five standard deviations. 0: a file of an older program does not tell.
     """
 
     noise: float
@@ -54,6 +58,7 @@ class SeenView:
     sigma_v_px: float
     shift_u_px: float
     shift_v_px: float
+    complete_from: float = 0.0
 
 
 BrightExposure = MeasuredExposure[Droplets, SeenView]
@@ -78,7 +83,7 @@ def measure_bright(
         Where to look.
     twins : int
         Simulated twins of the exposure in which ghosts are counted: each costs as much as the exposure itself. Where
-        views are not four, and apart, there is one at least.
+        nothing else tells them, as ``p_real`` was not tried on such views or spots, there is one at least.
     seed : int
         Of the twins.
     threads : int
@@ -104,7 +109,7 @@ def measure_bright(
     residuals = shot.residuals(fit.optics, fit.blobs)
     left = np.array([noise_of(residual) for residual in residuals])
     told = _told(shot, fit, search, residuals, left, noises)
-    count = twins_of(twins, len(images), search.lattice.directions)
+    count = twins or int(not is_told(told.droplets.p_real))
     if not count or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)
@@ -123,7 +128,7 @@ def _told(
     """What a fit tells, and whether to believe it."""
     unit = rms_of(np.maximum(left, MODEL_SHARE * fit.scale * fit.optics.gains))
     ratio, bare = rms(residuals) / unit, rms(shot.residuals(fit.optics, Blobs.none())) / unit
-    views = _seen(fit.optics, noises, left, search.names)
+    views = _seen(fit, noises, left, search.names)
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
     verdict, reasons = judged(beside_px, ratio, bare, LIMITS)
     if verdict is ShotVerdict.REFUSED:
@@ -132,6 +137,10 @@ def _told(
     hidden = Hidden.of(search.grid.shape, lambda shares: _is_seen(shot, search, search.places_at(shares)))
     found = MeasuredExposure(droplets, views, ratio, verdict, reasons, hidden=hidden)
     found = judged_by_company(judged_by_copies(found, search.grid), search.grid)
+    found = judged_by_smallest(found, [view.complete_from for view in views.values()])
+    if found.verdict is ShotVerdict.GOOD:
+        fainter_voxel = fainter(shot, search, fit).positions_voxel
+        found = judged_by_fainter(found, int(np.count_nonzero(search.holds(fainter_voxel))))
     return told_real(judged_by_probability(judged_by_volume(found)))
 
 
@@ -142,10 +151,12 @@ def _is_seen(shot: BlobImages, search: DropletSearch, positions_voxel: FloatArra
     return np.asarray(np.all((seen_px >= 0) & (seen_px <= sizes_px[:, None] - 1), axis=(0, 2)), np.bool_)
 
 
-def _seen(optics: BlobOptics, noises: FloatArray, left: FloatArray, names: Sequence[str]) -> dict[str, SeenView]:
+def _seen(fit: BrightFit, noises: FloatArray, left: FloatArray, names: Sequence[str]) -> dict[str, SeenView]:
+    optics = fit.optics
     gains, levels = optics.gains * noises, np.array([np.median(level) for level in optics.levels])
-    rows = np.column_stack([noises * left, levels * noises, gains / gains.mean(), optics.sigmas_px, optics.shifts_px])
-    return {name: SeenView(*row) for name, row in zip(names, rows.tolist(), strict=True)}
+    limits = np.full(len(gains), fit.complete_from * gains.mean())
+    seen = [noises * left, levels * noises, gains / gains.mean(), optics.sigmas_px, optics.shifts_px, limits]
+    return {name: SeenView(*row) for name, row in zip(names, np.column_stack(seen).tolist(), strict=True)}
 
 
 def _droplets(

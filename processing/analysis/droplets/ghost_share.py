@@ -47,7 +47,7 @@ def told_share(
     told = p_real[np.isfinite(p_real)]
     if not len(p_real):
         return NOTHING_MEASURED
-    if len(told) < LEAST_TOLD * len(p_real):
+    if not is_told(p_real):
         return f"whether droplets are real is unknown of {len(p_real) - len(told)} of {len(p_real)}; {untried}"
     share = expected_share(float(np.sum(1 - told)), len(told), exposures_per_shot)
     if not sized and share.value > MOST_BRIGHT:
@@ -56,6 +56,11 @@ def told_share(
             "told, as 0.3 to 1.3 times as many were ghosts; witnesses are twins (--twins) and unpaired_ghost_share"
         )
     return share
+
+
+def is_told(p_real: FloatArray) -> bool:
+    """Whether so many of the droplets (N,) have a probability that it says how many are ghosts."""
+    return bool(np.count_nonzero(np.isfinite(p_real)) >= LEAST_TOLD * len(p_real))
 
 
 def expected_share(ghosts: float, droplets: int, exposures_per_shot: float = 1) -> Estimate:

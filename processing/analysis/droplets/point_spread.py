@@ -11,7 +11,10 @@ from processing.analysis.smooth_level import smooth_level
 from processing.geometry import FloatArray
 from processing.kernels import _native
 
-LEAST_SIGMA_PX, MOST_SIGMA_PX = 0.4, (_native.MAX_BLOB_WINDOW_PX / 2 - 1) / _native.BLOB_REACH_SIGMAS
+STEP_PX = 0.01
+"""Of numerical derivatives."""
+LEAST_SIGMA_PX = 0.4
+MOST_SIGMA_PX = (_native.MAX_BLOB_WINDOW_PX / 2 - 1) / _native.BLOB_REACH_SIGMAS - STEP_PX
 ROUGH_PX = 41
 """What varies over more is no droplet."""
 DARKEST, DARKEST_SIGMAS = 0.01, 2.326
@@ -21,8 +24,6 @@ LEAST_CELL_PX, CELL_WIDTHS = 25, 20
 and must not follow droplets."""
 GUESSES = 3
 """Glare looks like wide droplets until the level is known, and that depends on how wide droplets are."""
-STEP_PX = 0.01
-"""Of numerical derivatives."""
 MOST_CHANGE = 0.1
 """Of gain and widths in one refinement; of shifts in px."""
 

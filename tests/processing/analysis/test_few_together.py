@@ -94,3 +94,16 @@ def test_small_droplets_that_no_shot_alone_misses_are_told_of_all_shots(complete
         spray_um = 13.0 * np.exp(0.4 * rng.standard_normal(100))
         shot.columns["diameter_um"][:] = np.tile(spray_um[spray_um > 12.0][:4], 2)
     assert ["all shots together: about" in what for what in few_together(several)] == [True] * told
+
+
+@pytest.mark.parametrize(("limit", "told"), [(0.2, False), (1.0, True), (0.0, False)])
+def test_bright_particles_that_noise_hides_in_each_shot_are_told_of_all_shots(limit: float, told: bool) -> None:
+    """A third of the spray is below seven tenths, from where on they are found in noise."""
+    several, rng = shots(40), np.random.default_rng(3)
+    for shot in several:
+        views = {f"view{view}": {"complete_from": limit} for view in range(1, 5)}
+        shot.provenance["exposures"] = json.dumps({"a": {"views": views}})
+        spray = np.exp(0.5 * rng.standard_normal(100))
+        shot.columns["amplitude"] = np.tile(spray[spray > 0.7][:4], 2)
+        del shot.columns["diameter_um"]
+    assert ["all shots together: about" in what for what in few_together(several)] == [True] * told

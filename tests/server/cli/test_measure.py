@@ -1,6 +1,7 @@
 """``tomoshadow measure``: droplets of a run in files, and bad input that gets one clear sentence."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -58,7 +59,8 @@ def test_droplets_of_a_run_lie_in_files_where_they_are(
         "shot", "droplets", "ghost_share", "ghost_interval", "residual_over_noise", "verdict", "cpu_s", "file"
     }  # fmt: skip
     assert (shot["shot"], shot["verdict"], result["polarity"]) == (0, "good", "bright")
-    unchecked, lengths, depth = result["not_checked"]
+    unchecked, lengths, depth, faint = result["not_checked"]
+    assert re.search(r"droplets fainter than 0\.0\d+ of full scale", faint["what"])
     assert "seen by the same lenses at the same focus" in lengths["what"]
     assert "sights hardly diverge in this volume" in depth["what"]
     assert "in proportion to light: any gamma fits bright particles" in unchecked["what"]

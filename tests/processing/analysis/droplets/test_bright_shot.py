@@ -8,9 +8,10 @@ import pytest
 
 from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_search import plan_droplets
-from processing.analysis.droplets.gaussian_blobs import Image
+from processing.analysis.droplets.gaussian_blobs import BlobImages, BlobOptics, Blobs, Image
 from processing.analysis.droplets.ghost_share import GhostShare, matches, told_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict, told_real
+from processing.analysis.droplets.point_spread import MOST_SIGMA_PX, refined_optics
 from processing.analysis.droplets.verdicts.explained_images import RatioLimits, judged
 from processing.analysis.droplets.verdicts.twins import judged_by_twins
 from processing.analysis.estimates import Estimate
@@ -18,7 +19,7 @@ from processing.analysis.hidden import Hidden
 from processing.geometry import FloatArray
 from processing.kernels import _native
 from processing.reconstruction.errors import ReconstructionError, RoughMapping
-from processing.studies.droplets import BrightScene, DropletCase
+from processing.studies.droplets import BrightScene, DropletCase, bright_images
 from processing.volume import VoxelGrid
 from tests.support.bright_scenes import GRID, MARGIN_VOXEL, scene, search_of
 
@@ -80,6 +81,70 @@ def test_views_along_the_same_lines_count_once() -> None:
         ShotVerdict.DOUBTFUL,
         ["of the droplets of a twin"],
     )
+
+
+def test_wide_spots_of_four_views_are_asked_by_a_twin() -> None:
+    """No probability was tried on them: nothing else tells their ghosts."""
+    truth = scene(DropletCase(28, sigma_px=2.4))
+    shot = measure_bright(truth.images, search_of(truth))
+    assert not np.isfinite(shot.droplets.p_real).any()
+    assert shot.twins is not None
+    assert shot.twins.found > 0.8 * len(truth.points_mm)
+
+
+def of_heights(heights: FloatArray, case: DropletCase, seed: int = 1) -> BrightScene:
+    """As many spots as there are heights, anywhere."""
+    rng = np.random.default_rng(seed)
+    empty = scene(case)
+    points_mm = GRID.to_mm(rng.uniform(3, np.array(GRID.shape) - 4, (len(heights), 3)))
+    return replace(
+        empty,
+        points_mm=points_mm,
+        heights=heights,
+        images=bright_images(case, empty.believed, points_mm, heights, rng),
+    )
+
+
+@pytest.mark.parametrize("noise_percent", [0.3, 1.0])
+@pytest.mark.parametrize("times", [20, 25])
+def test_a_class_of_droplets_too_faint_to_be_told_is_missed(times: float, noise_percent: float) -> None:
+    """Its light is left over; beside the bright ones it is less than what the model may be off."""
+    truth = of_heights(np.repeat([1.0, 1 / times], 20), DropletCase(noise_percent=noise_percent))
+    told = measure_bright(truth.images, search_of(truth))
+    assert len(told.droplets) == pytest.approx(20, abs=1)
+    assert told.residual_over_noise is not None
+    assert told.residual_over_noise < 1.05
+    assert told.verdict is ShotVerdict.DOUBTFUL
+    assert "fainter than a tenth of a typical one" in told.reasons[0]
+
+
+@pytest.mark.parametrize("case", [DropletCase(28, 1.5, 45), DropletCase(28, 1.0, 30)])
+def test_droplets_that_noise_hides_are_missed(case: DropletCase) -> None:
+    truth = scene(case, seed=2)
+    told = measure_bright(truth.images, search_of(truth))
+    assert found_and_ghosts(told, truth)[0] < 0.85
+    assert told.verdict is ShotVerdict.DOUBTFUL
+    assert "the distribution of amplitudes goes on below" in told.reasons[0]
+
+
+@pytest.mark.parametrize("case", [DropletCase(14, 0.8, 10), DropletCase(14, 1.0, 25), DropletCase(14, 2.0, 25)])
+def test_nearly_all_are_found_from_the_amplitude_on_that_is_told(case: DropletCase) -> None:
+    truth = of_heights(np.geomspace(0.05, 5, 40), case, seed=3)
+    told = measure_bright(truth.images, search_of(truth))
+    (limit,) = {view.complete_from for view in told.views.values()}
+    assert 0.2 < limit < 2
+    found = matches(told.droplets.points_mm, truth.points_mm, 1.5 * GRID.pitch_mm)[1] >= 0
+    assert np.mean(found[truth.heights > limit]) >= 0.94
+    assert np.mean(found[truth.heights < 0.4 * limit]) <= 0.1
+
+
+def test_spots_as_wide_as_any_can_be_refined(truth: BrightScene) -> None:
+    """In noise the fit may come there."""
+    images = BlobImages(tuple(truth.images), search_of(truth).lattice)
+    levels = tuple(np.zeros_like(image) for image in truth.images)
+    widest = BlobOptics(np.ones(4), np.full((4, 2), MOST_SIGMA_PX), np.zeros((4, 2)), levels)
+    refined = refined_optics(images, widest, Blobs(np.array([[86.0, 26.0, 46.0]]), np.ones(1)), shifts=True)
+    assert np.max(refined.sigmas_px) <= MOST_SIGMA_PX
 
 
 def test_noise_and_widths_come_from_the_images(shot: BrightExposure) -> None:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.verdicts.cut_sizes import cut_off
+from processing.analysis.droplets.verdicts.cut_sizes import AMPLITUDES, cut_off
+from processing.geometry import FloatArray
 
 LIMIT_UM = 12.0
 
@@ -47,6 +48,34 @@ def test_of_what_is_below_the_limit_only_the_part_that_is_not_found_is_missing()
 def test_two_sizes_of_which_none_is_near_the_limit_are_whole() -> None:
     two = np.random.default_rng(0).normal([18.0, 80.0], [1.0, 5.0], (200, 2)).ravel()
     assert cut_off(two, LIMIT_UM) == ""
+
+
+def seen_in_noise(median: float, spread: float, count: int, seed: int) -> tuple[FloatArray, float]:
+    """Amplitudes that are told of bright particles, over the limit, and the share that is not; 10 % of it is noise."""
+    rng = np.random.default_rng(seed)
+    seen = median * np.exp(spread * rng.standard_normal(count)) + 0.1 * rng.standard_normal(count)
+    is_told = (seen > 0.5) & (seen + 0.1 * rng.standard_normal(count) > 0.6)
+    return seen[is_told], float(np.mean(~is_told))
+
+
+@pytest.mark.parametrize(("median", "spread", "missing"), [(1.0, 0.5, 17), (0.8, 0.4, 26), (1.2, 0.7, 18)])
+def test_the_share_of_bright_particles_that_noise_hides_is_told(median: float, spread: float, missing: int) -> None:
+    seen = [seen_in_noise(median, spread, 1000, seed) for seed in range(10)]
+    assert 100 * np.mean([share for _, share in seen]) == pytest.approx(missing, abs=2)
+    shares = [int(cut_off(some, 1.0, AMPLITUDES).split("%")[0].split()[-1]) for some, _ in seen]
+    assert np.mean(shares) == pytest.approx(missing, abs=6)
+
+
+@pytest.mark.parametrize("count", [20, 60, 300])
+@pytest.mark.parametrize(("median", "spread"), [(2.0, 0.3), (3.0, 0.5), (5.0, 0.7), (1.5, 0.05), (20.0, 1.0)])
+def test_bright_particles_that_are_seen_in_the_noise_are_not_doubted(median: float, spread: float, count: int) -> None:
+    seen = [seen_in_noise(median, spread, count, seed)[0] for seed in range(50)]
+    assert sum(bool(cut_off(some, 1.0, AMPLITUDES)) for some in seen) <= 1
+
+
+def test_two_classes_of_bright_particles_in_the_noise_are_whole() -> None:
+    two = np.random.default_rng(0).normal([1.4, 7.0], [0.1, 0.3], (200, 2)).ravel()
+    assert cut_off(two, 1.0, AMPLITUDES) == ""
 
 
 def test_nothing_is_said_of_few_or_where_nobody_knows_the_limit() -> None:
