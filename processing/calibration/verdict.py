@@ -3,8 +3,9 @@
 import re
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated
 
-from pydantic import ConfigDict, with_config
+from pydantic import ConfigDict, Field, with_config
 
 BELONGING = "belonging"
 """Under this name results keep what droplets say of their run and calibration."""
@@ -69,8 +70,8 @@ class Unchecked:
         What to state so that it is checked.
     """
 
-    what: str
-    state: str
+    what: Annotated[str, Field(description="what may be wrong without showing")]
+    state: Annotated[str, Field(description="what to state so that it is checked")]
 
     @property
     def text(self) -> str:

@@ -141,8 +141,8 @@ def _stated_separation(separation_ns: float) -> Unchecked:
 def stated_rate(rate_hz: float) -> Unchecked:
     """Of a series of shots."""
     return Unchecked(
-        f"whether there are {rate_hz:g} shots per second, as was stated, and at even times: velocities along tracks are "
-        "in proportion, and accelerations by its square; only velocities from A to B would contradict it",
+        f"whether there are {rate_hz:g} shots per second, as was stated, and at even times: velocities along tracks "
+        "are in proportion, and accelerations by its square; only velocities from A to B would contradict it",
         "rate_hz as the trigger has it, by a counter; double exposures with a separation tell velocities of their own",
     )
 

@@ -6,8 +6,9 @@ Droplets are counted in fine classes of ln d, so that a fit of a draw takes no l
 import numpy as np
 from scipy.sparse import csr_array
 
-from processing.analysis.estimates import Estimate, Figures
+from processing.analysis.estimates import CONFIDENCE, Estimate, Figures
 from processing.analysis.spray.spray_sample import SpraySample
+from processing.analysis.unseen_tail import DrawnSprays, drawn_sprays, with_unseen
 from processing.geometry import FloatArray
 
 CLASSES = 400
@@ -30,23 +31,49 @@ def fit_estimates(sample: SpraySample) -> dict[str, tuple[Estimate | None, Estim
     def figures_of(drawn: SpraySample) -> Figures:
         return _figures(csr_array((cubes, (drawn.units, classes)), shape=(drawn.n_units, CLASSES)), means)
 
-    scale_um, spread, x_um, q = sample.estimated(figures_of)
+    told = sample.estimated(figures_of)
+    if sprays := drawn_sprays(sample.diameters_um, sample.exposures_per_shot):
+        told = [one and with_unseen(one, off, CONFIDENCE) for one, off in zip(told, _off(sprays).T, strict=True)]
+    scale_um, spread, x_um, q = told
     return {"lognormal": (scale_um, spread), "rosin-rammler": (x_um, q)}
+
+
+def _off(sprays: DrawnSprays) -> FloatArray:
+    """Logarithms of the four parameters of each sample less those of its spray, (rows, 4).
+
+    Of a lognormal spray of spread s they are 3 s^2, ln s, 3 s^2 + s / 2 and -ln s: the likelihood of Rosin and Rammler
+    is largest where q s = 1. Scales of ln d leave the equation of q as it is, so that it is solved in units of s.
+    """
+    spreads = sprays.spreads
+    median, spread, x, q = _of_weights(sprays.by_volume, sprays.levels).T
+    by_volume = 3 * spreads**2
+    return np.column_stack(
+        [
+            spreads * np.log(median) - by_volume,
+            np.log(spread),
+            spreads * np.log(x) - by_volume - spreads / 2,
+            np.log(q),
+        ]
+    )
 
 
 def _figures(volumes: csr_array, logs: FloatArray) -> Figures:
     """Median and standard deviation of ln d, X and q (rows, 4), of how often each unit is taken."""
 
     def figures(counts: FloatArray) -> FloatArray:
-        with np.errstate(invalid="ignore", divide="ignore"):
-            weights = counts @ volumes
-            weights /= weights.sum(axis=1, keepdims=True)
-            mean = weights @ logs
-            spread = np.sqrt(np.maximum(weights @ logs**2 - mean**2, 0))
-            x_um, q = _rosin_rammler(weights, logs, mean, spread)
-            return np.column_stack([np.exp(mean), spread, x_um, q])
+        return _of_weights(counts @ volumes, logs)
 
     return figures
+
+
+def _of_weights(volumes: FloatArray, logs: FloatArray) -> FloatArray:
+    """The same of the volume in each class, (rows, classes)."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        weights = volumes / volumes.sum(axis=1, keepdims=True)
+        mean = weights @ logs
+        spread = np.sqrt(np.maximum(weights @ logs**2 - mean**2, 0))
+        x_um, q = _rosin_rammler(weights, logs, mean, spread)
+        return np.column_stack([np.exp(mean), spread, x_um, q])
 
 
 def _rosin_rammler(

@@ -120,8 +120,7 @@ def _reasons(sizes: SizeStatistics, share: float | None, half_width: float | Non
     if share is not None and share > MOST_EXTREME:
         reasons.append(
             f"the largest droplet has {100 * share:.1f} % of the volume, more than {100 * MOST_EXTREME:g} %: intervals "
-            "of D32, of what is by volume, and of the shape of fits most of all, are too narrow, as larger ones may be "
-            "missing; measure more shots"
+            "of D32, and of quantiles by volume, are too narrow, as larger ones may be missing; measure more shots"
         )
     if half_width is None:
         reasons.append(sizes.reason or "there is no D32")

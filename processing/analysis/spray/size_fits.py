@@ -38,9 +38,7 @@ class SizeFit(FrozenValue):
     scale_within_um: Annotated[Estimate | None, Field(description="the same with its 95 % interval over shots")] = None
     shape_within: Annotated[
         Estimate | None,
-        Field(
-            description="likewise; of a lognormal it holds the truth in less than 95 %, and lies too low: see sample"
-        ),
+        Field(description="likewise; both hold what larger droplets than all that were seen may make of them"),
     ] = None
     d32_um: Annotated[float | None, Field(description="Sauter's mean that it has; null where it has none: q up to 1")]
     dv50_um: Annotated[float, Field(description="median by volume that it has")]

@@ -64,7 +64,8 @@ def rate_doubts(tracks: Columns, shots: Sequence[StoredDroplets], rate_hz: float
     if (median_m_s := np.median(_amounts(velocities_m_s[known]))) > FASTEST_M_S:
         yield f"droplets fly at {median_m_s:.3g} m/s, faster than any spray: is the rate of {rate_hz:g} Hz right?"
     both = known & np.isfinite(paired_m_s).all(axis=1)
-    early = tracks["shot"] <= np.median(tracks["shot"])
+    shot = tracks["shot"].astype(np.intp)
+    early = shot <= np.median(shot)
     unsure_m_s = _unsure_m_s(shots[0])
     parts = (both, both & early, both & ~early)
     if told := [one for part in parts if (one := _apart(velocities_m_s[part], paired_m_s[part], unsure_m_s))]:
