@@ -31,6 +31,8 @@ lose one or two of a hundred droplets whose amplitudes spread as exp(N(0, 0.5)).
 LEAST_LEFT = 0.03
 """Spots from so many median amplitudes on are looked for in what droplets leave, and counted as missing: what makes
 droplets no round Gaussians leaves less."""
+HALO_WIDTHS = 5.0
+"""So near to a droplet, in widths of it, what is left may be its halo: of spots with heavy wings it was at 3 to 4."""
 COMPLETE, SHARP_POWER = 2.0, 1.5
 """So many times brighter than the faintest that is told nearly all droplets are found; of spots that are narrower than
 a pixel, over the power of their width, as candidates stand a little beside them: see ``verdicts.cut_sizes``."""
@@ -131,7 +133,7 @@ def find_bright(shot: BlobImages, search: DropletSearch, before_round: Callable[
 
 
 def fainter(shot: BlobImages, search: DropletSearch, fit: BrightFit) -> Blobs:
-    """Spots that all views see beside the droplets, fainter than any that is told; none where noise hides them.
+    """Spots that all views see apart from the droplets, fainter than any that is told; none where noise hides them.
 
     Parameters
     ----------
@@ -145,7 +147,11 @@ def fainter(shot: BlobImages, search: DropletSearch, fit: BrightFit) -> Blobs:
         return Blobs.none()
     residuals = shot.residuals(fit.optics, fit.blobs)
     dark = replace(fit, blobs=Blobs.none().joined_by(_new_places(shot, search, fit, residuals, least)))
-    return merged(_fitted(shot, dark, residuals=residuals).brighter_than(least).blobs, APART_VOXEL)
+    lit = merged(_fitted(shot, dark, residuals=residuals).brighter_than(least).blobs, APART_VOXEL)
+    if not len(fit.blobs):
+        return lit
+    apart_voxel = cKDTree(fit.blobs.positions_voxel).query(lit.positions_voxel)[0]
+    return lit.where(np.asarray(apart_voxel > HALO_WIDTHS * rms_of(fit.optics.sigmas_px)))
 
 
 def _round(shot: BlobImages, search: DropletSearch, fit: BrightFit, number: int) -> tuple[BrightFit, float]:

@@ -89,7 +89,7 @@ def judged_by_fainter(shot: MeasuredExposure[Rows, Seen], fainter: int) -> Measu
     reason = (
         f"about {100 * fainter / together:.0f} % of the droplets, limit {100 * MOST_LOST:.0f} %, are missing: beside "
         f"those that are told all views see {fainter} spots which are fainter than a tenth of a typical one. Number "
-        "density is too small; are these droplets, too, or do spots have halos?"
+        "density is too small; or are they copies, by a second flash?"
     )
     return shot.doubted((reason,))
 

@@ -118,6 +118,20 @@ def test_a_class_of_droplets_too_faint_to_be_told_is_missed(times: float, noise_
     assert "fainter than a tenth of a typical one" in told.reasons[0]
 
 
+def test_heavy_wings_of_spots_are_no_droplets() -> None:
+    truth, rng = scene(DropletCase(5), seed=2), np.random.default_rng(2)
+    row, column = np.ogrid[: truth.images[0].shape[0], : truth.images[0].shape[1]]
+    images = []
+    for camera in truth.believed:
+        image = rng.normal(0, 0.03, truth.images[0].shape)
+        for (u, v), height in zip(camera.project(truth.points_mm), truth.heights, strict=True):
+            image += height * (1 + ((row - v) ** 2 + (column - u) ** 2) / 8.6) ** -3
+        images.append(image.astype(np.float32))
+    told = measure_bright(images, search_of(truth))
+    assert found_and_ghosts(told, truth) == (1, 0)
+    assert told.verdict is ShotVerdict.GOOD
+
+
 @pytest.mark.parametrize("case", [DropletCase(28, 1.5, 45), DropletCase(28, 1.0, 30)])
 def test_droplets_that_noise_hides_are_missed(case: DropletCase) -> None:
     truth = scene(case, seed=2)
