@@ -17,11 +17,18 @@ PROPORTION = {
     ),
     "shadow": Unchecked(
         "whether grey values are in proportion to light: a gamma near to 1 fits shadows that are a little smaller or "
-        "larger; one that is far from 1 is told where droplets are wider than their blur, or look veiled",
+        "larger; one that is far from 1, as sRGB has, is told where ten droplets or more are dark in three views, or "
+        "look veiled",
         "gamma 1 in the settings of the cameras, and a dark image; or --sizes: dots of known diameters, seen by the "
         "same cameras",
     ),
 }
+SINGLE_PROPORTION = Unchecked(
+    "whether grey values are in proportion to light: of one view nothing tells a gamma, and one of 0.5 makes discs of "
+    "14 px 5 % too small, one of 2 as much too large",
+    "gamma 1 in the settings of the camera; or dots of known diameters, seen by the same camera",
+)
+"""Of shadows in a single view."""
 LAMPS = Unchecked(
     "whether all views are in the same light: one is taken for all, and views of their own lamps, of 1 and of 1.5 "
     "apertures of the lens, make diameters up to a sixth too large",
@@ -226,7 +233,7 @@ def unchecked_images(
         Droplets are too few for that.
     """
     if polarity == "bright" or not sizes_known:
-        yield PROPORTION[polarity]
+        yield SINGLE_PROPORTION if single and polarity == "shadow" else PROPORTION[polarity]
     if polarity == "shadow" and not single:
         yield from (OPAQUE,) if sizes_known else (LAMPS, OPAQUE)
     if single:

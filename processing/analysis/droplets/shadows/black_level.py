@@ -13,6 +13,7 @@ import numpy as np
 
 from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.shadows.discs.opaque_discs import Discs
+from processing.analysis.droplets.shadows.least_left import least_left
 from processing.analysis.droplets.shadows.light.seen_light import LEAST_DROPLETS
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from processing.analysis.droplets.shadows.shadow_rounds import ShadowRounds
@@ -27,8 +28,6 @@ MOST = 0.03
 black is black."""
 SURE = 2.0
 """Standard deviations."""
-DRAWS = 100
-"""Of droplets with replacement."""
 PALE = 0.25
 """Of the light, that a shadow takes at most at its centre which has no say where enough others have one."""
 DEEPEST = 0.97
@@ -73,49 +72,22 @@ def black_doubts(shot: Transmissions, search: DropletSearch, fit: ShadowFit) -> 
     """What the droplets say against the black level; empty where they are too few to say anything."""
     if len(fit.discs) < LEAST_DROPLETS:
         return ()
-    asked = _depths(shot, fit) > PALE
+    asked = depths(shot, fit) > PALE
     if np.count_nonzero(asked) < LEAST_DROPLETS:
         asked = np.ones(len(asked), np.bool_)
     return black_level(lambda share: _left(shot, search, fit, share)[asked]).doubts
 
 
 def black_level(left: Callable[[float], FloatArray]) -> BlackLevel:
-    """The level that leaves least: the vertex of a parabola through the best one and its neighbours.
+    """The level that leaves least.
 
     Parameters
     ----------
     left : callable
         What is left around each of N droplets, squared, if so much of the light were no light of the images.
     """
-    tried = {step: np.log(np.maximum(left(step * STEP), 1e-12)) for step in (-1, 0, 1)}
-    while (step := _next(tried)) is not None:
-        tried[step] = np.log(np.maximum(left(step * STEP), 1e-12))
-    best = min(max(_best(tried), min(tried) + 1), max(tried) - 1)
-    around = np.array([tried[best + aside] for aside in (-1, 0, 1)])
-    number = around.shape[1]
-    draws = np.random.default_rng(0).integers(0, number, (DRAWS, number))
-    return BlackLevel(
-        STEP * float(best + _vertex(around.mean(axis=1))), STEP * float(np.std(_vertex(around[:, draws].mean(axis=2))))
-    )
-
-
-def _best(tried: dict[int, FloatArray]) -> int:
-    return min(tried, key=lambda step: float(tried[step].mean()))
-
-
-def _next(tried: dict[int, FloatArray]) -> int | None:
-    """The step beyond the best one, if that is the last on its side; None where both neighbours are known."""
-    best = _best(tried)
-    beyond = [step for step in (best - 1, best + 1) if LOWEST <= step <= HIGHEST and step not in tried]
-    return beyond[0] if beyond else None
-
-
-def _vertex(around: FloatArray) -> FloatArray:
-    """Of parabolas through what is left one step before, at, and one step beyond (3, ...), in steps; 1 at most."""
-    before, at, beyond = around
-    bend = np.maximum(before + beyond - 2 * at, 1e-12)
-    vertex: FloatArray = np.clip(0.5 * (before - beyond) / bend, -1.0, 1.0)
-    return vertex
+    found = least_left(lambda step: left(step * STEP), LOWEST, HIGHEST)
+    return BlackLevel(STEP * found.step, STEP * found.sd)
 
 
 def _left(shot: Transmissions, search: DropletSearch, fit: ShadowFit, share: float) -> FloatArray:
@@ -128,12 +100,12 @@ def _left(shot: Transmissions, search: DropletSearch, fit: ShadowFit, share: flo
 
 def _deeper(shot: Transmissions, fit: ShadowFit, share: float) -> Discs:
     """Discs about as large as they must be to be as dark behind a veil: where a fit begins."""
-    depths = _depths(shot, fit)
-    deeper = -np.log(1 - np.minimum(depths / (1 - share), DEEPEST)) * _wide_voxel2(shot, fit)
-    return Discs(fit.discs.positions_voxel, np.where(depths < LARGE, deeper, fit.discs.squares_voxel2))
+    taken = depths(shot, fit)
+    deeper = -np.log(1 - np.minimum(taken / (1 - share), DEEPEST)) * _wide_voxel2(shot, fit)
+    return Discs(fit.discs.positions_voxel, np.where(taken < LARGE, deeper, fit.discs.squares_voxel2))
 
 
-def _depths(shot: Transmissions, fit: ShadowFit) -> FloatArray:
+def depths(shot: Transmissions, fit: ShadowFit) -> FloatArray:
     """Share of the light that each disc takes at its centre, (N,)."""
     return np.asarray(1 - np.exp(-fit.discs.squares_voxel2 / _wide_voxel2(shot, fit)))
 

@@ -18,6 +18,7 @@ from processing.analysis.droplets.shadows.discs.opaque_discs import (
     DiscImages,
     DiscOptics,
     Discs,
+    Shadows,
     Sweeps,
 )
 from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views
@@ -99,7 +100,7 @@ class ShadowRounds:
     def in_light(self, fit: ShadowFit, condenser_ratio: float | None) -> Relit:
         """The droplets in some light, what it leaves around each, and how much of its fringes is there."""
         other = self.relit(fit, condenser_ratio)
-        shadows = self._recorded().drawn(other.optics, other.discs)
+        shadows = self.shadows(other)
         seen = seen_by(self._shot, other, shadows.transmissions)
         squares = seen.supports(shadows, other.optics, other.discs).residual ** 2
         return Relit(squares, other.discs.radii_voxel, fringes_of(seen, shadows))
@@ -112,17 +113,21 @@ class ShadowRounds:
         """The very same droplets in other light, fitted to it."""
         if not len(fit.discs):
             return fit
-        return self._settled(relit(fit, condenser_ratio, self._shot.lattice.pixels_per_voxel))
+        return self.settled(relit(fit, condenser_ratio, self._shot.lattice.pixels_per_voxel))
 
     def left_around(self, fit: ShadowFit) -> FloatArray:
         """What is left around each droplet, squared, once the very same droplets are fitted to the images."""
-        return self._supports(self._settled(fit)).residual ** 2
+        return self._supports(self.settled(fit)).residual ** 2
 
-    def _settled(self, fit: ShadowFit) -> ShadowFit:
+    def shadows(self, fit: ShadowFit) -> Shadows:
+        """What its droplets let through."""
+        return self._recorded().drawn(fit.optics, fit.discs)
+
+    def settled(self, fit: ShadowFit) -> ShadowFit:
         """The very same droplets, fitted."""
         for _ in range(RELIT_ROUNDS):
             self._before_round()
-            shadows = self._recorded().drawn(fit.optics, fit.discs)
+            shadows = self.shadows(fit)
             seen = seen_by(self._shot, fit, shadows.transmissions)
             discs, _ = seen.fitted(shadows, fit.optics, fit.discs, SWEEPS[1])
             fit = self._estimated(fit.with_discs(discs), unite=False)
@@ -183,7 +188,7 @@ class ShadowRounds:
 
     def _fitted(self, fit: ShadowFit, stage: Stage) -> ShadowFit:
         least = COARSE_LEAST if stage.coarse else SHARP_LEAST * stage.threshold
-        shadows = self._recorded().drawn(fit.optics, fit.discs)
+        shadows = self.shadows(fit)
         seen = seen_by(self._shot, fit, shadows.transmissions)
         discs = fit.discs
         for sweeps in SWEEPS:
@@ -215,7 +220,7 @@ class ShadowRounds:
         return seen_by(self._shot, fit, self._drawn(fit))
 
     def _supports(self, fit: ShadowFit) -> DiscSupports:
-        shadows = self._recorded().drawn(fit.optics, fit.discs)
+        shadows = self.shadows(fit)
         return seen_by(self._shot, fit, shadows.transmissions).supports(shadows, fit.optics, fit.discs)
 
     def _knowing(self, fit: ShadowFit) -> NDArray[np.int64]:

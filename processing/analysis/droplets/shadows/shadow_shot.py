@@ -22,6 +22,7 @@ from processing.analysis.droplets.shadows.judged_volume import (
 from processing.analysis.droplets.shadows.light.light_search import Light
 from processing.analysis.droplets.shadows.light.seen_light import SeenLight
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
+from processing.analysis.droplets.shadows.proportion import proportion_doubts
 from processing.analysis.droplets.shadows.seen_shadows import SeenShadows, seen_shadows
 from processing.analysis.droplets.shadows.shadow_finder import (
     behind_gaussian_blur,
@@ -105,6 +106,8 @@ def measure_shadows(
     told = judged_by_probability(judged_by_volume(told))
     if told.verdict is ShotVerdict.GOOD:
         told = told.doubted(light_contradicted(shot, search, fit, light, before_round))
+    if told.verdict is ShotVerdict.GOOD:
+        told = told.doubted(proportion_doubts(shot, search, fit))
     told = told_real(told)
     count = twins_of(twins, len(images), search.lattice.directions)
     if not count or told.verdict is not ShotVerdict.GOOD:

@@ -1,0 +1,43 @@
+"""Grey values that are no light, as of sRGB: diameters were a tenth to a fifth wrong, and *good*."""
+
+import numpy as np
+import pytest
+
+import tomoshadow
+from processing.analysis.droplets.bright_shot import BrightExposure
+from processing.analysis.droplets.droplet_table import SizedDroplets
+from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure
+from tests.hunt.rig import believed
+from tests.hunt.world import HALF_MM, drawn, taken
+
+GRID = tomoshadow.VoxelGrid.centred((144, 156, 204), 1 / 60)
+
+
+def measured(kind: str, seed: int, gamma: float) -> tuple[float, BrightExposure | ShadowExposure]:
+    """Error of the mean diameter over it, and what is told where shots, backgrounds and dark images have a gamma."""
+    world = drawn(kind, seed)
+    pictures = taken(world)
+    recorded = (pictures.shots[0, 0], pictures.backgrounds, pictures.darks)
+    seen, lit, dark = (np.rint(255 * np.clip(image, 0, 1) ** gamma) for image in recorded)
+    lights = np.divide(seen - dark, lit - dark).astype(np.float32)
+    images = {f"view{number}": light for number, light in enumerate(lights, start=1)}
+    calibration = believed(world.views, HALF_MM + 0.6)
+    told = tomoshadow.measure(calibration, images, GRID, polarity="shadow", light="gaussian")
+    assert isinstance(told.droplets, SizedDroplets)
+    return float(told.droplets.diameters_um.mean() / world.clouds[0].diameters_um.mean()) - 1, told
+
+
+@pytest.mark.parametrize(("gamma", "wrong"), [(1 / 2.2, -0.15), (1.4, 0.1)])
+def test_a_gamma_is_told_by_how_edges_fall_off(gamma: float, wrong: float) -> None:
+    error, told = measured("some", 1, gamma)
+    assert error / wrong > 0.9
+    assert told.verdict is ShotVerdict.DOUBTFUL
+    assert any("in proportion to light" in reason for reason in told.reasons)
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("some", 1), ("mono", 2), ("three views", 3)])
+def test_light_as_it_is_is_good(kind: str, seed: int) -> None:
+    error, told = measured(kind, seed, 1.0)
+    assert abs(error) < 0.01
+    assert told.verdict is ShotVerdict.GOOD
