@@ -1,6 +1,7 @@
 """Fit what evidence weighs for ``p_real`` to simulated shots: ``python -m tests.support.fit_reality bright|shadows``.
 
-What it prints is what is in use. Cases and seeds are others than those of ``processing.studies.real_droplets``, which
+What it printed is in use; of shadows since before their blur came to rest, as new weights are no better
+(``shadow_table.REALITY``). Cases and seeds are others than those of ``processing.studies.real_droplets``, which
 tries the outcome.
 """
 

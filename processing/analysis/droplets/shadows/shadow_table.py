@@ -16,6 +16,8 @@ from processing.geometry import FloatArray
 LEAST_NOISE = 0.5
 """Where places are told, over that of the image: less would be no noise of pixels."""
 REALITY = Reality(-8.94, (0.84, 2.74, 1.01, -2.2, -3.07, -2.65, -1.14), widths_px=(0.8, 1.6), most_crowding=1.0)
+"""Fitted before blur and diameters came to rest together. Fitted anew they tell cases that neither had seen no better:
+of 472 ghosts among 16,140 droplets these expect 451, and new ones 442."""
 
 
 def sized_droplets(
