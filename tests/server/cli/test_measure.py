@@ -216,6 +216,7 @@ def test_shadows_of_a_run_become_droplets_with_diameters(tmp_path: Path, capsys:
     assert (result["polarity"], result["shots"][0]["verdict"]) == ("shadow", "good")
     gamma, lamps, opaque, _lengths, _depth = (one["what"] for one in result["not_checked"])
     assert "a gamma near to 1 fits shadows" in gamma
+    assert "black is where the dark image says so" in gamma
     assert "whether all views are in the same light" in lamps
     assert "whether droplets are opaque alike" in opaque
     stored = read_droplets(tmp_path / "out" / result["shots"][0]["file"])

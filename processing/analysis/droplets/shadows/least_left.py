@@ -26,7 +26,7 @@ class LeastLeft:
 
 
 def least_left(left: Callable[[int], FloatArray], lowest: int, highest: int) -> LeastLeft:
-    """The vertex of a parabola through the best step and its neighbours.
+    """The vertex of a parabola through the best step and its neighbours, each draw by its own.
 
     Parameters
     ----------
@@ -38,11 +38,11 @@ def least_left(left: Callable[[int], FloatArray], lowest: int, highest: int) -> 
     tried = {step: np.log(np.maximum(left(step), 1e-12)) for step in (-1, 0, 1)}
     while (step := _next(tried, lowest, highest)) is not None:
         tried[step] = np.log(np.maximum(left(step), 1e-12))
-    best = min(max(_best(tried), min(tried) + 1), max(tried) - 1)
-    around = np.array([tried[best + aside] for aside in (-1, 0, 1)])
-    number = around.shape[1]
+    levels = np.array([tried[step] for step in sorted(tried)])
+    number = levels.shape[1]
     draws = np.random.default_rng(0).integers(0, number, (DRAWS, number))
-    return LeastLeft(float(best + _vertex(around.mean(axis=1))), float(np.std(_vertex(around[:, draws].mean(axis=2)))))
+    others = _lowest(levels[:, draws].mean(axis=2))
+    return LeastLeft(float(min(tried) + _lowest(levels.mean(axis=1))), float(np.std(others)))
 
 
 def _best(tried: dict[int, FloatArray]) -> int:
@@ -56,9 +56,10 @@ def _next(tried: dict[int, FloatArray], lowest: int, highest: int) -> int | None
     return beyond[0] if beyond else None
 
 
-def _vertex(around: FloatArray) -> FloatArray:
-    """Of parabolas through what is left one step before, at, and one step beyond (3, ...), in steps; 1 at most."""
-    before, at, beyond = around
+def _lowest(left: FloatArray) -> FloatArray:
+    """Where least is left of what is at successive steps (steps, ...), in steps from the first; draws may differ."""
+    best = np.clip(left.argmin(axis=0), 1, len(left) - 2)
+    before, at, beyond = (np.take_along_axis(left, (best + aside)[None], axis=0)[0] for aside in (-1, 0, 1))
     bend = np.maximum(before + beyond - 2 * at, 1e-12)
-    vertex: FloatArray = np.clip(0.5 * (before - beyond) / bend, -1.0, 1.0)
-    return vertex
+    lowest: FloatArray = best + np.clip(0.5 * (before - beyond) / bend, -1.0, 1.0)
+    return lowest

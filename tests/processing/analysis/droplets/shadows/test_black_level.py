@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.shadows.black_level import BlackLevel, black_level
+from processing.analysis.droplets.shadows.black_level import LOWEST, STEP, BlackLevel, black_level
 from processing.geometry import FloatArray
 
 
@@ -28,6 +28,16 @@ def test_it_is_found_wherever_it_is(true_share: float) -> None:
 def test_what_every_level_explains_alike_says_nothing() -> None:
     noise = np.random.default_rng(2).uniform(0.5, 2, (99, 12))
     assert black_level(lambda share: noise[round(100 * share)]).doubts == ()
+
+
+def noise_is_doubted(seed: int) -> bool:
+    noise = 0.02 * np.random.default_rng(seed).standard_normal((8, 40))
+    return bool(black_level(lambda share: np.exp(noise[round(share / STEP) - LOWEST])).doubts)
+
+
+def test_noise_alone_is_seldom_doubted() -> None:
+    """Of other droplets another level would be the best one by far: that is what is not known of it."""
+    assert sum(map(noise_is_doubted, range(100))) < 20
 
 
 def test_a_veil_beyond_all_that_are_tried_is_told() -> None:
