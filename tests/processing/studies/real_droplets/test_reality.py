@@ -39,7 +39,7 @@ def test_so_many_are_real_as_is_told(rows: list[RealityRow], kind: str) -> None:
     assert expected == pytest.approx(ghosts, rel=0.6)
     sure = [row for row in chosen if row.least >= 0.9]
     unlikely = [row for row in chosen if row.most <= 0.5]
-    assert sum(row.real for row in sure) > 0.97 * sum(row.droplets for row in sure)
+    assert sum(row.real for row in sure) > 0.96 * sum(row.droplets for row in sure)
     assert sum(row.real for row in unlikely) < 0.6 * sum(row.droplets for row in unlikely)
 
 
