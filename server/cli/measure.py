@@ -16,7 +16,6 @@ from server.cli.runs.measured_text import droplets_summary, droplets_table
 from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, with_grid
 from server.cli.runs.resuming import resumable
 from server.cli.runs.single_view import IN_THE_IMAGE, add_single_view, measure_single_view, refuse
-from server.cli.runs.unchecked_droplets import tell_unchecked
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -202,42 +201,33 @@ def _measure_shots(
 def _result(
     options: Namespace, settings: "MeasureSettings", run_dir: Path, shots: "list[ShotDroplets]", files: list[Path]
 ) -> dict[str, Any]:
-    """What the shots say together, of which people are told what casts doubt."""
-    from processing.analysis.copied_shots import copies_told
+    """What the shots say together, of which people are told what casts doubt, and what nothing checks."""
+    from daq.files.run_directory import RunReader
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.droplets.droplet_statistics import droplet_statistics
-    from processing.analysis.few_together import few_together
-    from processing.analysis.lingering_droplets import lingering_told
-    from processing.analysis.near_or_far import depth_doubts
     from processing.analysis.velocity.velocity_statistics import velocity_statistics
+    from processing.calibration.calibration_file import load_calibration
     from processing.runs.droplets.measure_settings import METHOD_VERSION
+    from processing.runs.droplets.told_together import told_together
     from processing.runs.liquid.objects import liquid_summary
     from processing.runs.recipe import recipe_sha256
-    from processing.runs.sprays.conditions import changes_told
 
     stored = [read_droplets(file) for file in files]
+    with RunReader(run_dir) as run:
+        together = told_together(run, load_calibration(options.calibration), stored, files)
+    for told in (*together.doubts, *(one.text for one in together.not_checked)):
+        progress(told)
     return {
-        "conditions_changed": _told(changes_told(stored, files)),
-        "copies": _told(copies_told(stored)),
-        "same_droplets": _told(lingering_told(stored)),
-        "depth": _told(depth_doubts(stored)),
-        "few_together": _told(few_together(stored)),
+        **together.model_dump(mode="json"),
         "polarity": settings.polarity,
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "grid": settings.model_dump(mode="json")["grid"],
         "shots": [shot.model_dump(mode="json") for shot in shots],
-        "not_checked": tell_unchecked(options.calibration, run_dir, settings, shots, stored),
         "statistics": droplet_statistics(stored).model_dump(mode="json"),
         "velocity": velocity_statistics(stored).model_dump(mode="json"),
         **liquid_summary(stored).model_dump(mode="json"),
         "passed": any(shot.verdict != "refused" for shot in shots),
     }
-
-
-def _told(doubts: tuple[str, ...]) -> list[str]:
-    for doubt in doubts:
-        progress(doubt)
-    return list(doubts)
 
 
 def _here(

@@ -59,8 +59,9 @@ def test_droplets_of_a_run_lie_in_files_where_they_are(
         "shot", "droplets", "ghost_share", "ghost_interval", "residual_over_noise", "verdict", "cpu_s", "file"
     }  # fmt: skip
     assert (shot["shot"], shot["verdict"], result["polarity"]) == (0, "good", "bright")
-    unchecked, lengths, depth, faint = result["not_checked"]
+    unchecked, lengths, depth, faint, height = result["not_checked"]
     assert re.search(r"droplets fainter than 0\.0\d+ of full scale", faint["what"])
+    assert "whether all views still look where they did at the target" in height["what"]
     assert "seen by the same lenses at the same focus" in lengths["what"]
     assert "sights hardly diverge in this volume" in depth["what"]
     assert "in proportion to light: any gamma fits bright particles" in unchecked["what"]
@@ -214,7 +215,7 @@ def test_shadows_of_a_run_become_droplets_with_diameters(tmp_path: Path, capsys:
     shot, arguments = shadow_run(tmp_path)
     result = told(capsys, *arguments)
     assert (result["polarity"], result["shots"][0]["verdict"]) == ("shadow", "good")
-    gamma, lamps, opaque, _lengths, _depth = (one["what"] for one in result["not_checked"])
+    gamma, lamps, opaque, _lengths, _depth, _height = (one["what"] for one in result["not_checked"])
     assert "a gamma near to 1 fits shadows" in gamma
     assert "black is where the dark image says so" in gamma
     assert "whether all views are in the same light" in lamps

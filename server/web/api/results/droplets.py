@@ -13,8 +13,8 @@ router = APIRouter(prefix="/api/runs/{run_id}/results/{results_id}/droplets", ta
 
 @router.get("", responses=responses(404, 500))
 def show_droplets(run_id: RunId, results_id: ResultsId, context: ContextOf) -> MeasuredRun:
-    """Verdicts shot by shot, and the statistics of the spray with their intervals."""
-    return measured_run(context.runs.directory(run_id) / "results" / results_id)
+    """Verdicts shot by shot, the statistics of the spray with their intervals, and what nothing checks."""
+    return measured_run(context.runs.directory(run_id) / "results" / results_id, context.calibrations)
 
 
 @router.get("/{shot}.h5", response_class=FileResponse, responses=responses(404))

@@ -165,7 +165,8 @@ def _belonging(job: Job) -> str:
 def _is_doubtful(job: Job) -> bool:
     """Whether something that is done is not to be trusted without a look: amber, not green."""
     result = job.result or {}
-    verdicts = [result.get("verdict"), *(view.get("verdict") for view in _views(result).values())]
+    parts = [result, result.get("velocity") or {}, *_views(result).values()]
+    verdicts = [part.get("verdict") for part in parts]
     doubted = [verdict for verdict in verdicts if verdict not in (*_TRUSTED, ShotVerdict.GOOD, ShotVerdict.EMPTY, None)]
     belonging = result.get(BELONGING, {}).get("verdict") in (Verdict.WARN, Verdict.REFUSE)
     return bool(doubted) or belonging or any(fault_lines(volume) for volume in result.get("volumes", ()))
@@ -177,10 +178,18 @@ def _views(result: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def _found(job: Job) -> str:
-    """Droplets, verdict and reasons of a measurement; nothing before it has ended."""
+    """Droplets, verdict and reasons of a measurement, and of its velocities; nothing before it has ended."""
     if not job.result:
         return ""
-    return "; ".join([f"{counted(job.result['droplets'], 'droplet')}, {job.result['verdict']}", *job.result["reasons"]])
+    found = f"{counted(job.result['droplets'], 'droplet')}, {job.result['verdict']}"
+    return "; ".join([found, *job.result["reasons"], *_flown(job.result.get("velocity"))])
+
+
+def _flown(velocity: dict[str, Any] | None) -> list[str]:
+    """Verdict and reasons of velocities that are not good; nothing where a shot has none."""
+    if velocity is None or velocity["verdict"] == ShotVerdict.GOOD:
+        return []
+    return [f"velocities {velocity['verdict']}", *velocity["reasons"]]
 
 
 _DETAIL = {

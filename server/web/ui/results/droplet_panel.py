@@ -23,8 +23,9 @@ _COLUMNS = {
     "d32": "D32, µm",
     "ghosts": "Ghosts, %",
     "verdict": "Verdict",
+    "not_checked": "Not checked",
 }
-_VERDICT = '<q-td :props="props"><div class="verdict" tabindex="0">{{ props.value }}</div></q-td>'
+_LONG = '<q-td :props="props"><div class="verdict" tabindex="0">{{ props.value }}</div></q-td>'
 """Reasons may be many lines: they scroll."""
 
 
@@ -39,7 +40,8 @@ class DropletPanel:
             ]
             self._table = ui.table(columns=columns, rows=[], row_key="id").classes("w-full")
             self._table.props('dense flat wrap-cells hide-bottom :pagination="{rowsPerPage: 0}"')
-            self._table.add_slot("body-cell-verdict", _VERDICT)
+            for name in ("verdict", "not_checked"):
+                self._table.add_slot(f"body-cell-{name}", _LONG)
         self._panel.set_visibility(False)
 
     async def show(self, run_id: str, sets: Sequence[ResultSet]) -> None:
@@ -52,7 +54,8 @@ class DropletPanel:
 
     def _row(self, run_id: str, results_id: str) -> dict[str, Any]:
         try:
-            run = measured_run(self._context.runs.directory(run_id) / "results" / results_id)
+            results_dir = self._context.runs.directory(run_id) / "results" / results_id
+            run = measured_run(results_dir, self._context.calibrations)
         except ServerError as error:
             return {"id": results_id, "results": results_id, "verdict": str(error)}
         return {"id": results_id, "results": results_id, **droplet_row(run)}
@@ -67,6 +70,7 @@ def droplet_row(run: MeasuredRun) -> dict[str, str]:
         "d32": _told(statistics.d32_um, statistics.reason),
         "ghosts": _told(statistics.ghost_share, statistics.ghost_reason, _percent),
         "verdict": _verdicts(run),
+        "not_checked": "; ".join(one.what for one in run.together.not_checked),
     }
 
 
@@ -91,11 +95,12 @@ def _percent(share: float) -> str:
 
 
 def _verdicts(run: MeasuredRun) -> str:
-    """How many shots are good, and of all others the reasons, each with its shots."""
+    """How many shots are good, of all others the reasons, each with its shots, and what they say together."""
     counts = Counter(str(shot.verdict) for shot in run.shots)
     reasons: dict[str, list[int]] = {}
     for shot in run.shots:
         for reason in shot.reasons:
             reasons.setdefault(reason, []).append(shot.shot)
     told = [f"shot {', '.join(map(str, shots))}: {reason}" for reason, shots in reasons.items()]
-    return "; ".join([", ".join(f"{count} {verdict}" for verdict, count in counts.items()), *told])
+    good = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
+    return "; ".join([good, *told, *run.doubts])

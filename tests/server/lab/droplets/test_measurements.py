@@ -20,6 +20,7 @@ from processing.calibration.calibration_record import content_id
 from processing.runs.droplets.measure_settings import MeasureSettings
 from processing.runs.errors import Stopped
 from processing.runs.sprays.measured_spray import read_spray
+from server.lab.calibrations import CalibrationStore
 from server.lab.droplets.measured import measured_run
 from server.lab.droplets.measurement import settings_within
 from server.lab.errors import Unprocessable
@@ -104,6 +105,9 @@ def test_shots_and_statistics_are_told_and_files_downloaded(measured: Serving, t
     assert (statistics["d32_um"], statistics["reason"][:16]) == (None, "bright particles")
     assert told["velocity"]["pairs"] == 0
     assert "shots have one exposure" in told["velocity"]["reason"]
+    unchecked = " ".join(one["what"] for one in told["together"]["not_checked"])
+    assert "any gamma fits bright particles" in unchecked
+    assert told["together"]["copies"] == ["bright, shot 1 has the very droplets of bright, shot 0: one is a copy"]
     path = tmp_path / "downloaded.h5"
     path.write_bytes(measured.http.get(f"{address}/1.h5").content)
     assert len(read_droplets(path).columns["x_mm"]) == told["shots"][1]["droplets"]
@@ -216,18 +220,22 @@ def test_droplets_that_are_not_those_that_were_measured_are_refused(
 
 def test_the_page_tells_numbers_with_intervals_and_reasons(measured: Serving) -> None:
     results_dir = next(measured.services.data_dir.glob("bright/results/droplets-*"))
-    row = droplet_row(measured_run(results_dir))
+    row = droplet_row(measured_run(results_dir, CalibrationStore(measured.services.data_dir / "calibrations")))
     assert row["droplets"].endswith("in 2 exposures of shots 0 to 1")
     assert [told_shots(shots) for shots in ([0, 1, 2], [4, 0, 2])] == ["shots 0 to 2", "3 shots from 0 to 4"]
     assert re.fullmatch(r"2\d(\.\d)? \(2\d(\.\d)? to 3\d(\.\d)?\)", row["density"])
     assert row["d32"].startswith("bright particles have no diameter")
     assert re.fullmatch(r"0\.\d\d \(0\.00 to \d\.\d\d\)", row["ghosts"])
-    assert row["verdict"] == "2 good"
+    assert row["verdict"] == "2 good; bright, shot 1 has the very droplets of bright, shot 0: one is a copy"
     job, *_ = measured.http.get("/api/jobs", params={"kind": "measurement"}).json()
     known = next(job for job in jobs_on_disk(measured.services.data_dir, EventPublisher()))
     told = job_row(known.model_copy(update={"result": job["result"]}))
     assert told["job"] == "droplets of shot 0"
-    assert told["detail"] == f"{job['result']['droplets']} droplets, good"
+    assert (told["detail"], told["colour"]) == (f"{job['result']['droplets']} droplets, good", "positive")
+    velocity = {"verdict": "doubtful", "reasons": ["two motions"]}
+    told = job_row(known.model_copy(update={"result": {**job["result"], "velocity": velocity}}))
+    assert told["detail"].endswith(" droplets, good; velocities doubtful; two motions")
+    assert told["colour"] == "warning"
 
 
 @pytest.mark.parametrize("before", [0, 3])
