@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import bdtr, pdtr, pdtrc
 
 from processing.analysis.droplets.droplet_file import FRAME, StoredDroplets
-from processing.analysis.droplets.droplet_statistics import REFUSED, told_exposures
+from processing.analysis.droplets.droplet_statistics import REFUSED
 from processing.analysis.stored_json import stored_json
 
 MOST_RATIO, MOST_RATIO_OF_SHOTS = 1.5, 1.1
@@ -60,7 +60,7 @@ def unlike_shots(shots: Sequence[StoredDroplets]) -> str:
 
     Those that are refused do not count.
     """
-    told = [(shot, len(told_exposures(shot))) for shot in shots]
+    told = [(shot, _counted_exposures(shot)) for shot in shots]
     counts = [(shot.name, round(len(shot.columns[FRAME]) / exposures)) for shot, exposures in told if exposures]
     odd = [place for place in range(len(counts)) if _is_odd(*_beside([count for _, count in counts], place))]
     if not odd:
@@ -72,6 +72,11 @@ def unlike_shots(shots: Sequence[StoredDroplets]) -> str:
         f"({name}: {count}, a median one of the others: {median:g}): does the light flash in all of them, and does "
         "the spray last? Means over them are of no one spray, and intervals hardly know it"
     )
+
+
+def _counted_exposures(shot: StoredDroplets) -> int:
+    exposures = stored_json(shot.provenance, "exposures").values()
+    return sum(one.get("verdict") != REFUSED for one in exposures)
 
 
 def _beside(counts: Sequence[int], place: int) -> tuple[int, float]:

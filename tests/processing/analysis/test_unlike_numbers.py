@@ -18,7 +18,8 @@ EMPTY = np.arange(0)
 
 def shot(first: int, second: int, verdict: str = "good") -> StoredDroplets:
     told = {"a": {"verdict": "good"}, "b": {"verdict": verdict}}
-    return StoredDroplets({"frame": np.repeat(["a", "b"], [first, second])}, {"exposures": json.dumps(told)})
+    columns = {"frame": np.repeat(["a", "b"], [first, second]), "amplitude": np.ones(first + second)}
+    return StoredDroplets(columns, {"exposures": json.dumps(told)})
 
 
 @pytest.mark.parametrize("count", [0, 10])

@@ -52,7 +52,7 @@ def test_reconstruct_says_before_the_second_shot_which_views_are_slow(
     assert (first, second) == ("run: shot 0 by mlos", "run: shot 2 by mlos")
     assert [line.split()[0] for line in slow] == ["view1", "view2", "view3"]
     assert all(re.search(r"takes the exact way, which is slower.*px wide, limit 1.5 px", line) for line in slow)
-    heads, *volumes, summary, _belonging, unchecked = output.splitlines()
+    heads, *volumes, summary, _belonging, unchecked, _height = output.splitlines()
     assert heads.split() == ["shot", "exposure", "seconds", "file"]
     assert [tuple(line.split()[:2]) for line in volumes] == [("0", "A"), ("0", "B"), ("2", "A"), ("2", "B")]
     assert all((tmp_path / "out" / line.split()[3]).is_file() for line in volumes)

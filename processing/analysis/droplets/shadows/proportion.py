@@ -23,9 +23,12 @@ from processing.geometry import FloatArray
 STEP = 1.4
 """From one power that is tried to the next."""
 MOST_STEPS = 2
-LIMIT, SURE = 0.3, 2.0
+LIMIT, SURE = 0.45, 2.0
 """Steps from proportion, beyond so many standard deviations. Of simulated shots in any light -0.21 to 0.14 is told
-where the power is 1; 0.4 to 0.5 where images have a gamma of 0.7, by which diameters are 10 % too small."""
+where the power is 1, and -0.36 where a tenth of many droplets are ghosts; 0.4 to 0.6 where images have a gamma of 0.7,
+1.0 to 1.2 where they have that of sRGB."""
+WRONG_BY = 20.0
+"""Percent of the diameters per step; glare around shadows, as of a tenth of the light, looks like one, and costs 2."""
 LEAST_BEND = 0.015
 """Of the logarithms of what powers a step below and above leave, over what the images do: 0.06 to 0.2, but 0.004 where
 droplets of one size are hardly larger than their blur, which then explains much of what a power does."""
@@ -34,9 +37,13 @@ FEWEST_VIEWS = 3
 
 
 def proportion_doubts(shot: Transmissions, search: DropletSearch, fit: ShadowFit) -> tuple[str, ...]:
-    """What droplets say against grey values in proportion to light; empty where too few say anything."""
+    """What droplets say against grey values in proportion to light; empty where too few say anything.
+
+    Nor do edges behind a blur narrower than pixels: how these fall off is the pixels' doing.
+    """
     asked = depths(shot, fit) > PALE
-    if np.count_nonzero(asked) < LEAST_DROPLETS or len(shot.images) < FEWEST_VIEWS:
+    resolved = ShadowRounds(shot, search).resolves_light(fit)
+    if np.count_nonzero(asked) < LEAST_DROPLETS or len(shot.images) < FEWEST_VIEWS or not resolved:
         return ()
     left = cache(lambda step: _left(shot, search, fit, STEP**step)[asked])
     below, here, above = (float(np.log(np.maximum(left(step), 1e-12)).mean()) for step in (-1, 0, 1))
@@ -51,8 +58,9 @@ def _told(found: LeastLeft) -> tuple[str, ...]:
     wrong = "small" if found.step > 0 else "large"
     return (
         f"droplets explain the images better by their power of {STEP**found.step:.2g} than by grey values in "
-        f"proportion to light: do images have a gamma, as sRGB has, or were they processed? Diameters are too {wrong} "
-        "then, by a tenth to a fifth; record with gamma 1, or undo it before the import",
+        "proportion to light: do images have a gamma, as sRGB has, were they processed, or is there glare around "
+        f"shadows? Diameters are too {wrong} then, by up to {WRONG_BY * abs(found.step):.0f} %; record with gamma 1, "
+        "or undo it before the import",
     )
 
 
