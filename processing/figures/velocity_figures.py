@@ -63,6 +63,8 @@ def velocities_figure(shot: StoredDroplets, least_p_pair: float = 0.5, title: st
     figure.axes[0].quiverkey(arrows, 0.04, 0.96, key_m_s, f"{key_m_s:g} m/s", labelpos="E", coordinates="figure")
     figure.colorbar(arrows, ax=figure.axes, label="speed [m/s]")
     told = f"{np.count_nonzero(paired)} of {len(paired)} droplets of exposure A have a partner in B"
+    if not paired.all():
+        told += "; grey dots have none"
     figure.suptitle(f"{title or shot.name}: {told}", fontsize="medium")
     return figure
 

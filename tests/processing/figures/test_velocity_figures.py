@@ -32,7 +32,9 @@ def test_every_pair_is_an_arrow_where_its_droplet_is_in_each_of_three_panels() -
         return np.asarray(drawn.columns[name][:20], np.float64)
 
     figure = velocities_figure(drawn)
-    assert "spray, shot 7: 20 of 23 droplets of exposure A have a partner in B" in str(figure.get_suptitle())
+    told = "spray, shot 7: 20 of 23 droplets of exposure A have a partner in B; grey dots have none"
+    assert figure.get_suptitle() == told
+    assert "grey" not in velocities_figure(shot(20, alone=0)).get_suptitle()
     for axes, (across, down, along, below) in zip(figure.axes, PANELS, strict=False):
         assert axes.get_xlabel() == f"{across} [mm]"
         (arrows,) = (one for one in axes.collections if isinstance(one, Quiver))
