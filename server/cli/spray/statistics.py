@@ -91,4 +91,6 @@ def _differences(found: "tuple[Difference, ...]") -> str:
         ]
         for one in found
     ]
-    return table(["runs", "figure", "ratio, 95 %", "p, Holm", ""], rows)
+    said = "p is corrected for all of these figures and pairs (Holm): below 0.05 a figure differs"
+    none = "" if any(one.significant for one in found) else "; none does beyond chance"
+    return f"{table(['runs', 'figure', 'ratio, 95 %', 'p', ''], rows)}\n{said}{none}"

@@ -115,6 +115,15 @@ def test_a_comparison_finds_what_differs_and_says_what_was_measured_differently(
     text = shown(capsys, "statistics", results / "monday", results / "tuesday", "--compare")
     compared_by_name = [line for line in text.splitlines() if line.startswith("tuesday / monday")]
     assert any("number density [1/mm³]" in line and "differs" in line for line in compared_by_name)
+    assert text.strip().endswith("(Holm): below 0.05 a figure differs")
+
+
+def test_a_comparison_in_which_nothing_differs_says_so(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    again = write_results(tmp_path / "again", cone_shots(2, 5, 120), run="again", calibration="cal-1")
+    text = shown(capsys, "statistics", results / "monday", again, "--compare")
+    assert text.strip().endswith("below 0.05 a figure differs; none does beyond chance")
 
 
 def test_a_run_without_droplets_or_with_all_of_them_in_one_shot_is_told_beside_others(
