@@ -58,7 +58,7 @@ def _draw_shares(axes: Axes, one: Patternation) -> None:
     )
     axes.set_title(title, fontsize="small")
     axes.set(xlabel=f"azimuth from {one.azimuths[0]} [°]", ylabel=f"share [%], {one.weighting}")
-    axes.set(xlim=(0, 360), ylim=(0, None))
+    axes.set(xlim=(0, 360), ylim=(0, None), xticks=range(0, 361, 45))
     axes.legend(fontsize="x-small")
 
 
