@@ -54,7 +54,8 @@ def write_tecplot(path: Path, stored: Stored) -> None:
     numbers = {name: column for name, column in columns.items() if column.dtype.kind not in "US"}
     numbers[DOUBTFUL] = doubtful(stored)
     ordered = {name: numbers[name] for name in sorted(numbers, key=lambda name: not name.startswith(POSITION))}
-    title = ", ".join(str(stored.provenance[name]) for name in STILL if name in stored.provenance)
+    still = {name: str(stored.provenance[name]) for name in STILL if name in stored.provenance}
+    title = ", ".join(value if name == "run" else f"{name} {value}" for name, value in still.items())
     with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         file.write(f'TITLE = "{_quotable(title)}"\n')
         file.write("VARIABLES = " + " ".join(f'"{name}"' for name in ordered) + "\n")

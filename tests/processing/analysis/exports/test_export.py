@@ -217,7 +217,7 @@ def test_tecplot_has_a_zone_per_exposure_and_no_number_that_is_none(file: Path) 
     path, stored = export_droplets(file, "tecplot"), read_droplets(file).columns
     assert path.name == "shot_00007_droplets.dat"
     title, names, zones, told = tecplot_zones(path)
-    assert title == "spray, 7"
+    assert title == "spray, shot 7"
     assert told == {"verdict": "doubtful", "doubts": DOUBT.replace('"', "'")}
     assert names[:3] == ["x_mm", "y_mm", "z_mm"]
     assert set(names) == {"shot", "doubtful", *stored} - {"frame"}
