@@ -3,6 +3,7 @@
 import re
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, Route, expect
@@ -10,6 +11,7 @@ from playwright.sync_api import Browser, Locator, Page, Route, expect
 from tests.support.cut_link import CutLink, cut_link
 from tests.support.desk import PULSE, choose_calibration, laboratory, picture, start
 from tests.support.operator import go_to, open_drawer, press_for_light
+from tests.support.sampled_sprays import cone_shots, write_results
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of
 
@@ -355,6 +357,23 @@ def test_the_drawer_squeezes_no_narrow_page(page: Page, server: Serving) -> None
     assert (now["x"], now["width"]) == (before["x"], before["width"])
 
 
+def test_what_shots_say_together_and_nothing_checks_is_on_the_page(page: Page, server: Serving) -> None:
+    run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
+    (shot,) = cone_shots(0, 1, 40)
+    copies = [replace(shot, provenance={**shot.provenance, "shot": number}) for number in (0, 1)]
+    measured = write_results(server.services.data_dir / run_id / "results" / "droplets-1", copies, run=run_id)
+    (measured / "settings.json").write_text("{}")
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.goto(f"{server.http.base_url}/results/{run_id}")
+    cells = page.get_by_role("region", name="Droplets", exact=True).get_by_role("cell")
+    expect(cells.nth(5)).to_contain_text("has the very droplets of")
+    expect(cells.nth(6)).to_contain_text("whether grey values are in proportion to light")
+    picture(page, "droplets-told")
+    box = cells.nth(6).locator(".verdict").bounding_box()
+    assert box is not None
+    assert box["height"] < 120
+
+
 def test_many_reasons_of_droplets_make_no_row_of_the_height_of_the_page(page: Page, server: Serving) -> None:
     run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
     named = "a reason " * 21 + "more"
@@ -364,7 +383,7 @@ def test_many_reasons_of_droplets_make_no_row_of_the_height_of_the_page(page: Pa
     (measured / "shot_00000_droplets.h5").write_bytes(b"no HDF5")
     page.set_viewport_size({"width": 1280, "height": 900})
     page.goto(f"{server.http.base_url}/results/{run_id}")
-    verdict = page.get_by_role("region", name="Droplets").get_by_role("cell").last
+    verdict = page.get_by_role("region", name="Droplets").get_by_role("cell").nth(5)
     expect(verdict).to_contain_text(named)
     box = verdict.bounding_box()
     assert box is not None

@@ -25,7 +25,7 @@ _COLUMNS = {
     "verdict": "Verdict",
     "not_checked": "Not checked",
 }
-_LONG = '<q-td :props="props"><div class="verdict" tabindex="0">{{ props.value }}</div></q-td>'
+_LONG = '<q-td :props="props"><div class="verdict {}" tabindex="0">{{{{ props.value }}}}</div></q-td>'
 """Reasons may be many lines: they scroll."""
 
 
@@ -40,8 +40,8 @@ class DropletPanel:
             ]
             self._table = ui.table(columns=columns, rows=[], row_key="id").classes("w-full")
             self._table.props('dense flat wrap-cells hide-bottom :pagination="{rowsPerPage: 0}"')
-            for name in ("verdict", "not_checked"):
-                self._table.add_slot(f"body-cell-{name}", _LONG)
+            self._table.add_slot("body-cell-verdict", _LONG.format(""))
+            self._table.add_slot("body-cell-not_checked", _LONG.format("unchecked"))
         self._panel.set_visibility(False)
 
     async def show(self, run_id: str, sets: Sequence[ResultSet]) -> None:
