@@ -1,8 +1,9 @@
 """Patternation: which part of the liquid goes where, by sectors and rings around the axis, at a distance of the nozzle.
 
 What an optical or mechanical patternator measures (Tate, Spray patternation, Ind. Eng. Chem. 52, 1960). Liquid per
-measured volume of each cell times the volume of the whole cell: what a box leaves out at a cell's edge counts as the
-rest of it. A cell of which the box holds less than half is not known.
+measured volume of each cell times the volume of the whole cell: what a box leaves out at a cell's edge, and what liquid
+hides in it, counts as the rest of it. A cell of which less than half lies in the box and could be measured is not
+known.
 
 *Asymmetry* is half the sum of ``|share - 1 / n|`` over the n sectors: 0 is even, 1 - 1 / n all in one. Few droplets are
 never even, so beside it stands what 95 % of even sprays stay below: every shot turned around the axis by whole
@@ -47,7 +48,7 @@ class Patternation(FrozenValue):
     azimuths: Annotated[tuple[str, str], Field(description="which way 0 and 90 degrees lie: x, -z, or a vector")]
     liquid_ppm: Annotated[
         tuple[tuple[float | None, ...], ...],
-        Field(description="volume of liquid per volume, 1e-6, ring by ring, sector by sector; null: not in the box"),
+        Field(description="volume of liquid per volume, 1e-6, ring by ring, sector by sector; null: not measured"),
     ]
     sector_shares: Annotated[
         tuple[Estimate | None, ...], Field(description="of all; empty where a cell is not known")
@@ -93,11 +94,11 @@ def patternation(
     ring = np.searchsorted(ring_edges_mm, radius_mm, side="right") - 1
     cell = ring * sectors + np.minimum((azimuth_deg * sectors / 360).astype(int), sectors - 1)
     slice_edges_mm = at_mm + thickness_mm * np.array([-0.5, 0.5])
-    (inside_mm3,) = cell_volumes_mm3(axis, sample.box_mm, (slice_edges_mm, ring_edges_mm, sector_edges_deg))
+    edges = (slice_edges_mm, ring_edges_mm, sector_edges_deg)
+    (measured_mm3,) = cell_volumes_mm3(axis, sample.box_mm, edges, sample.share_measured)
     whole_mm3 = np.pi * np.diff(ring_edges_mm**2)[:, None] * thickness_mm / sectors * np.ones(sectors)
-    covered = inside_mm3 / whole_mm3
+    covered = measured_mm3 / whole_mm3
     flow = axial_volumes(chosen, axis)
-    exposures = float(sample.volumes_mm3.sum() / np.prod(sample.box_mm[1] - sample.box_mm[0]))
     told = {
         "at_mm": at_mm,
         "thickness_mm": thickness_mm,
@@ -106,23 +107,19 @@ def patternation(
         "ring_edges_mm": tuple(ring_edges_mm.tolist()),
         "sectors": sectors,
         "azimuths": tuple(map(direction_name, axis.frame[1:])),
-        "liquid_ppm": _liquid_ppm(chosen, cell, inside_mm3, exposures, covered),
+        "liquid_ppm": _liquid_ppm(chosen, cell, sample.exposures * measured_mm3, covered),
         **_shares(chosen, cell, flow, covered),
     }
     return Patternation.model_validate(told)
 
 
 def _liquid_ppm(
-    sample: SpraySample,
-    cell: NDArray[np.intp],
-    inside_mm3: FloatArray,
-    exposures: float,
-    covered: FloatArray,
+    sample: SpraySample, cell: NDArray[np.intp], seen_mm3: FloatArray, covered: FloatArray
 ) -> list[list[float | None]]:
-    """Of so many whole exposures; what is hidden in a shot is taken off everywhere alike."""
+    """Of the volume of each cell that could be measured, of all exposures together."""
     liquid = MM3_PER_UM3 * np.pi / 6 * np.bincount(cell, sample.cubes_um3, covered.size).reshape(covered.shape)
     with np.errstate(invalid="ignore", divide="ignore"):
-        ppm = 1e6 * liquid / (exposures * inside_mm3)
+        ppm = 1e6 * liquid / seen_mm3
     return [
         [value if known else None for value, known in zip(values, knowns, strict=True)]
         for values, knowns in zip(ppm.tolist(), (covered >= LEAST_COVERED).tolist(), strict=True)
@@ -132,8 +129,8 @@ def _liquid_ppm(
 def _shares(sample: SpraySample, cell: NDArray[np.intp], flow: FloatArray, covered: FloatArray) -> dict[str, object]:
     if (covered < LEAST_COVERED).any():
         return {
-            "reason": "the box does not hold the spray all around at this distance: measure a wider box, or nearer to "
-            "the nozzle"
+            "reason": "the box does not hold the spray all around at this distance, or liquid hides a part of it: "
+            "measure a wider box, nearer to the nozzle, or farther from where liquid hangs together"
         }
     whole_flow = flow / covered.ravel()[cell]
     if whole_flow.sum() <= 0:

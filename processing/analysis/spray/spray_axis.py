@@ -1,6 +1,6 @@
 """SprayAxis: where a spray comes from and where it goes, and droplets in its coordinates."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,7 +88,12 @@ def corners(box_mm: FloatArray) -> FloatArray:
     return np.stack(np.meshgrid(*box_mm.T, indexing="ij"), axis=-1).reshape(8, 3)
 
 
-def cell_volumes_mm3(axis: SprayAxis, box_mm: FloatArray, edges: Sequence[FloatArray]) -> FloatArray:
+def cell_volumes_mm3(
+    axis: SprayAxis,
+    box_mm: FloatArray,
+    edges: Sequence[FloatArray],
+    share_of: Callable[[FloatArray], FloatArray] | None = None,
+) -> FloatArray:
     """Which volume of a box lies in every cell of edges along the axis, from it, and around it; by counting a lattice.
 
     Parameters
@@ -99,6 +104,8 @@ def cell_volumes_mm3(axis: SprayAxis, box_mm: FloatArray, edges: Sequence[FloatA
         Lower and upper corner.
     edges : three (k + 1,) arrays
         Along the axis and from it in mm, azimuth in degrees.
+    share_of : callable, optional
+        Which share of places (N, 3) counts; default: all of it.
 
     Returns
     -------
@@ -110,6 +117,7 @@ def cell_volumes_mm3(axis: SprayAxis, box_mm: FloatArray, edges: Sequence[FloatA
     steps = [(np.arange(n) + 0.5) / n for n in counts]
     lattice = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
     lattice_mm = box_mm[0] + extents_mm * lattice
-    counted, _ = np.histogramdd(np.column_stack(axis.coordinates(lattice_mm)), bins=list(edges))
+    weights = share_of(lattice_mm) if share_of else None
+    counted, _ = np.histogramdd(np.column_stack(axis.coordinates(lattice_mm)), bins=list(edges), weights=weights)
     volumes: FloatArray = counted * np.prod(extents_mm) / len(lattice)
     return volumes

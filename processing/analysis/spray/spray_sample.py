@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.cells import measured_shares
+from processing.analysis.cells import PLANES, measured_shares
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DIAMETER, measured_grid, measured_mm3, told_exposures
 from processing.analysis.estimates import CONFIDENCE, COUNTED_DRAWS, DRAWS, FEW_SHOTS, Estimate, Figures, estimated
@@ -15,6 +15,8 @@ from processing.geometry import FloatArray
 from processing.volume import VoxelGrid
 
 VELOCITY = ("u_m_s", "v_m_s", "w_m_s")
+LEAST_SHARE = 1e-9
+"""Of a column of cells that could be measured: where none could, the quotient is 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +60,11 @@ class SpraySample:
     def several(self) -> bool:
         """Whether there are shots to draw; of a single one droplets are drawn."""
         return len(self.volumes_mm3) > 1
+
+    @property
+    def exposures(self) -> float:
+        """How many they are, of all shots together."""
+        return len(self.volumes_mm3) * self.exposures_per_shot
 
     @property
     def has_empty_shots(self) -> bool:
@@ -114,6 +121,23 @@ class SpraySample:
         if self.several:
             return counts @ self.volumes_mm3[:, None]
         return np.full((len(counts), 1), self.volumes_mm3.sum())
+
+    def share_measured(self, points_mm: FloatArray) -> FloatArray:
+        """Of the exposures, those that could be measured at places (N, 3) in the box; alike where files do not say.
+
+        Two maps tell: over x and y, mean along z, and over x and z, mean along y. At each x they are taken for
+        independent.
+        """
+        if self.box_mm is None:
+            return np.ones(len(points_mm))
+        if not set(PLANES) <= self.measured_shares.keys():
+            whole_mm3 = self.exposures * np.prod(np.diff(self.box_mm, axis=0))
+            return np.full(len(points_mm), self.volumes_mm3.sum() / whole_mm3)
+        by_y, by_z = (self.measured_shares[plane].sum(axis=0) / self.exposures for plane in PLANES)
+        cells = np.array([by_y.shape[1], len(by_y), len(by_z)])
+        places = cells * (points_mm - self.box_mm[0]) / np.diff(self.box_mm, axis=0)
+        x, y, z = np.clip(places.astype(int), 0, cells - 1).T
+        return np.asarray(by_y[y, x] * by_z[z, x] / np.maximum(by_y.mean(axis=0), LEAST_SHARE)[x])
 
     @cached_property
     def as_one_shot(self) -> "SpraySample":
