@@ -34,8 +34,8 @@ LIGHTEST_KG_M3, PA_PER_BAR = 600.0, 1e5
 """Of what is liquid at room temperature: it leaves a nozzle the fastest."""
 SIZES, FEWEST_OF_SIZES = 8, 100
 """Classes of diameters, of equal numbers; droplets with a velocity."""
-MOST_BY_SIZES, SURE = 0.02, 0.99
-"""Of the mean speed."""
+MOST_BY_SIZES, MOST_BY_VOLUME, SURE = 0.02, 0.03, 0.99
+"""Of the mean speed by number, and by volume: of the flux."""
 MOST_ASIDE_DEG = 45.0
 """Of the mean velocity from the axis; a spray flies along its axis, however wide it is."""
 
@@ -144,9 +144,33 @@ def _of_unpaired(sample: SpraySample) -> Iterator[str]:
     paired = sample.paired
     if np.count_nonzero(paired) < FEWEST_OF_SIZES or paired.all():
         return
+    by_number, by_volume = np.ones(len(sample)), sample.cubes_um3
+    if (ratio := _if_alike(sample, by_number, MOST_BY_SIZES)) is not None:
+        mean_m_s = float(np.linalg.norm(sample.velocities_m_s[paired], axis=1).mean())
+        yield (
+            f"{100 * np.mean(~paired):.0f} % of the droplets have no velocity, and are of other sizes than those that "
+            f"have one: the mean speed is {mean_m_s:.3g} m/s of these, but {ratio * mean_m_s:.3g} m/s if all of "
+            "a size fly alike; mean velocities and flux are of those that have one"
+        )
+    elif (ratio := _if_alike(sample, by_volume, MOST_BY_VOLUME)) is not None:
+        yield (
+            f"droplets with {100 * by_volume[~paired].sum() / by_volume.sum():.0f} % of the liquid have no "
+            "velocity, and are of other sizes than those that have one: flux is wrong by a factor of "
+            f"{ratio:.2f}, or by more where none of the largest has one, and flux-weighted diameters lack them"
+        )
+
+
+def _if_alike(sample: SpraySample, weights: FloatArray, most: float) -> float | None:
+    """Mean speed by weight of all droplets, if those of a size fly alike, over that of those with a velocity.
+
+    None where it is 1, but for so much, or for chance.
+    """
+    paired = sample.paired
     speeds_m_s = np.where(paired, np.linalg.norm(np.nan_to_num(sample.velocities_m_s), axis=1), 0.0)
-    place = np.argsort(np.argsort(sample.diameters_um, kind="stable"), kind="stable")
-    of_class = np.eye(SIZES)[place * SIZES // len(sample)]
+    order = np.argsort(sample.diameters_um, kind="stable")
+    before = np.empty(len(order))
+    before[order] = np.cumsum(weights[order]) - weights[order]
+    of_class = weights[:, None] * np.eye(SIZES)[np.minimum((before * SIZES / weights.sum()).astype(int), SIZES - 1)]
     columns = np.hstack([of_class, of_class * paired[:, None], of_class * speeds_m_s[:, None]])
 
     def ratio_of(drawn: SpraySample) -> Figures:
@@ -154,13 +178,8 @@ def _of_unpaired(sample: SpraySample) -> Iterator[str]:
         return lambda counts: _by_all_sizes(sums(counts))
 
     (ratio,) = sample.estimated(ratio_of, signed=True, confidence=SURE)
-    if ratio and abs(ratio.value - 1) > MOST_BY_SIZES and not ratio.low <= 1 <= ratio.high:
-        mean_m_s = float(speeds_m_s.sum() / np.count_nonzero(paired))
-        yield (
-            f"{100 * np.mean(~paired):.0f} % of the droplets have no velocity, and are of other sizes than those that "
-            f"have one: the mean speed is {mean_m_s:.3g} m/s of these, but {ratio.value * mean_m_s:.3g} m/s if all of "
-            "a size fly alike; mean velocities and flux are of those that have one"
-        )
+    is_sure = ratio and abs(ratio.value - 1) > most and not ratio.low <= 1 <= ratio.high
+    return ratio.value if ratio and is_sure else None
 
 
 def _by_all_sizes(sums: FloatArray) -> FloatArray:
