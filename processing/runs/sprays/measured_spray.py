@@ -10,7 +10,8 @@ import numpy as np
 
 from processing.analysis.copied_shots import in_common
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
-from processing.analysis.droplets.droplet_statistics import measured_grid, require_poolable, told_exposures
+from processing.analysis.droplets.droplet_statistics import DIAMETER, measured_grid, require_poolable, told_exposures
+from processing.analysis.few_together import found_from
 from processing.analysis.lingering_droplets import lingering_told
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_doubts import NOT_STATED, noted
@@ -21,6 +22,8 @@ from processing.runs.droplets_in_place import read_in_place
 from processing.runs.sprays.conditions import changes_told, spray_around
 
 PATTERN = "shot_*_droplets.h5"
+MOST_UNLIKE = 1.25
+"""Ratio of the diameters, or amplitudes, from which on droplets are found in two sprays."""
 AGAIN = {"spray": "; shots that were measured before nozzle or axis were mended are measured again"}
 
 
@@ -177,7 +180,8 @@ def read_compared(folders: Sequence[Path]) -> ComparedSprays:
         )
     unlike = _differing(sprays, _measured, "differ in {}")
     conditions = _differing(sprays, lambda one: noted(one.shots), "are sprays of other conditions: {}")
-    return ComparedSprays(named, (*unlike, *_elsewhere(sprays), *_shared(sprays), *_lingering(sprays)), conditions)
+    of_places = (*_elsewhere(sprays), *_shared(sprays), *_lingering(sprays))
+    return ComparedSprays(named, (*unlike, *_found_from(sprays), *of_places), conditions)
 
 
 def _elsewhere(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
@@ -187,6 +191,23 @@ def _elsewhere(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
         if axis != its:
             places = " and ".join(f"{one.nozzle_mm} mm along {one.direction}" for one in (axis, its))
             yield f"{other} and {first} differ in nozzle and axis: {places}"
+
+
+def _found_from(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
+    """Where smaller droplets are found in one than in another, as noise and blur differ: means differ by it, too."""
+    (first, its), *others = ((spray.name, _complete_from(spray.shots)) for spray in sprays)
+    for other, least in others:
+        if max(least, its) > MOST_UNLIKE * min(least, its) > 0:
+            unit = "um" if DIAMETER in sprays[0].shots[0].columns else "of full scale"
+            yield (
+                f"{other} and {first} differ in the smallest droplets that are found: {least:.3g} and {its:.3g} "
+                f"{unit}; smaller ones are missing in numbers and means"
+            )
+
+
+def _complete_from(shots: Sequence[StoredDroplets]) -> float:
+    """Diameter, or amplitude, from which on droplets are found, in the middle of the shots; 0: files do not say."""
+    return float(np.median([found_from(shot) for shot in shots]))
 
 
 def _shared(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
