@@ -6,6 +6,7 @@ from statistics import fmean
 
 from daq.files.run_directory import RunHeader
 from processing.analysis.two_exposures.alone_droplets import MOST_ALONE, REMEDY
+from processing.analysis.velocity.track_doubts import MOST_OFF
 from processing.calibration.verdict import Unchecked
 from processing.preprocessing import Polarity
 
@@ -180,6 +181,20 @@ def unlike_motions(shares_alone: Sequence[float]) -> list[Unchecked]:
             "ghosts they do not; in another motion, beyond reach or of hardly any, mean velocity and flux are not "
             "those of all",
             REMEDY,
+        )
+    ]
+
+
+def off_tracks(share_alone: float | None) -> list[Unchecked]:
+    """Of a series, in which so many of the droplets that would stay in the grid are on no track; None: nobody asked."""
+    if not share_alone or share_alone <= MOST_OFF:
+        return []
+    return [
+        Unchecked(
+            f"how the {100 * share_alone:.1f} % of the droplets fly that would stay in the grid for five shots and are "
+            "on no track: in series of one motion there are hardly any. Where a part of the spray flies otherwise, "
+            "most of it leaves the grid earlier, and mean velocities of tracks are not those of all",
+            "a higher rate, so that all move by less than their neighbours are away; or measure each stream alone",
         )
     ]
 

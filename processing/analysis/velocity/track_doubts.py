@@ -11,7 +11,7 @@ from processing.analysis.droplets.droplet_statistics import P_REAL, measured_gri
 from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.shot_doubts import COMPONENTS
 from processing.analysis.stored_json import stored_json
-from processing.analysis.two_exposures.alone_droplets import alone_among
+from processing.analysis.two_exposures.alone_droplets import Alone, alone_among
 from processing.analysis.velocity.common_motion import Indices
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import pair
@@ -148,7 +148,7 @@ def _lies_still(still: NDArray[np.bool_], speeds_m_s: FloatArray) -> bool:
     return bool(np.count_nonzero(still) > few and np.count_nonzero(slow) < np.count_nonzero(still) / 2)
 
 
-def alone_doubts(tracks: Columns, shots: Sequence[StoredDroplets], rate_hz: float) -> Iterator[str]:
+def alone_on_no_track(tracks: Columns, shots: Sequence[StoredDroplets], rate_hz: float) -> Alone:
     """Droplets on no track that would stay in the grid for two shots before and after, were they like those on tracks.
 
     Parameters
@@ -157,14 +157,13 @@ def alone_doubts(tracks: Columns, shots: Sequence[StoredDroplets], rate_hz: floa
         As of ``rate_doubts``.
     """
     if not len(ways_mm := _common_ways_mm(tracks, rate_hz)) or not (grid := measured_grid(shots[0])):
-        return
+        return Alone(0, 0, sure=False)
     numbers = {_number(shot) for shot in shots}
     asked = [shot for shot in shots if P_REAL in shot.columns and numbers >= _around(_number(shot))]
     staying = [(shot, _staying(shot, grid, ways_mm)) for shot in asked]
     p_real = [np.asarray(shot.columns[P_REAL], np.float64)[rows] for shot, rows in staying]
     linked = [np.isin(rows, tracks["droplet"][tracks["shot"] == _number(shot)]) for shot, rows in staying]
-    alone = alone_among(np.concatenate([np.empty(0), *p_real]), np.concatenate([np.empty(0, np.bool_), *linked]))
-    yield from alone.said("stay in the grid are on no track", "are not seen again", MOST_OFF)
+    return alone_among(np.concatenate([np.empty(0), *p_real]), np.concatenate([np.empty(0, np.bool_), *linked]))
 
 
 def _common_ways_mm(tracks: Columns, rate_hz: float) -> FloatArray:

@@ -17,7 +17,8 @@ from processing.analysis.velocity.common_motion import FEWEST
 from processing.analysis.velocity.moving_droplets import LEAST_SIZE, MovingDroplets
 from processing.analysis.velocity.noise_curve import M_PER_MM, NoiseCurve, noise_curve
 from processing.analysis.velocity.track_doubts import (
-    alone_doubts,
+    MOST_OFF,
+    alone_on_no_track,
     order_doubts,
     rate_doubts,
     still_doubts,
@@ -39,6 +40,10 @@ NO_TRACK = (
     "no droplet is on a track: do droplets move by more than 25 voxels from shot to shot, are shots at even times, and "
     "are they of one series?"
 )
+
+
+ON_NO_TRACK = ("stay in the grid are on no track", "are not seen again")
+"""What is said of droplets that do so, and what else they may do than fly in another motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +68,9 @@ class DropletTracks:
         Shots before and after a droplet that have a say in its motion.
     noise_curve : NoiseCurve | None
         What other half windows would show; None with few droplets on tracks.
+    share_alone : float | None
+        Of the surely real droplets that would stay in the grid, those on no track; None where something else is
+        doubted, or nothing tells which are real.
     """
 
     columns: Columns
@@ -73,6 +81,7 @@ class DropletTracks:
     doubts: tuple[str, ...] = ()
     half_window: int = HALF_WINDOW
     noise_curve: NoiseCurve | None = None
+    share_alone: float | None = None
 
     @property
     def share_tracked(self) -> float:
@@ -127,11 +136,12 @@ def track_droplets(
         *uneven_doubts(frames, linked.ids, first),
         *still_doubts(columns),
     )
-    alone = alone_doubts(columns, ordered, rate_hz) if not contradicted else ()
-    doubts = (*exposure_doubts(ordered, "a"), *contradicted, *alone)
+    alone = None if contradicted else alone_on_no_track(columns, ordered, rate_hz)
+    doubts = (*exposure_doubts(ordered, "a"), *contradicted, *(alone.said(*ON_NO_TRACK, MOST_OFF) if alone else ()))
     reason = None if linked.count else _why(frames)
     curve = noise_curve(frames, linked, grid.pitch_mm, rate_hz)
-    return DropletTracks(columns, linked.count, count, rate_hz, reason, doubts, half_window, curve)
+    share_alone = alone.share if alone and alone.sure else None
+    return DropletTracks(columns, linked.count, count, rate_hz, reason, doubts, half_window, curve, share_alone)
 
 
 def _why(frames: Sequence[MovingDroplets]) -> str:

@@ -66,9 +66,10 @@ def tracks(options: Namespace) -> Outcome:
 
 def _told(linked: "DropletTracks", shots: "list[StoredDroplets]", file: Path) -> dict[str, Any]:
     from processing.analysis.even_rows import row_spacing_mm
-    from processing.runs.unchecked_images import even_rows, stated_rate, told_unchecked
+    from processing.runs.unchecked_images import even_rows, off_tracks, stated_rate, told_unchecked
 
-    unchecked = [stated_rate(linked.rate_hz), *even_rows(row_spacing_mm(shots))] if linked.tracks else []
+    told = (*even_rows(row_spacing_mm(shots)), *off_tracks(linked.share_alone))
+    unchecked = [stated_rate(linked.rate_hz), *told] if linked.tracks else []
     return {
         "tracks": linked.tracks,
         "shots": len(shots),
