@@ -11,6 +11,7 @@ import numpy as np
 from daq.files.atomic_file import replacing
 from processing.analysis.droplets.droplet_file import PROVENANCE, SCHEMA_KEYS, DropletFileError, Value, unit_of
 from processing.analysis.droplets.droplet_table import Columns
+from processing.analysis.seal import SEAL, seal_of
 from processing.analysis.velocity.track_table import DropletTracks
 
 SCHEMA, SCHEMA_VERSION = "tomoshadow/tracks", 1
@@ -36,6 +37,8 @@ class StoredTracks:
 def write_tracks(path: Path, tracks: DropletTracks, provenance: Mapping[str, Value]) -> None:
     """Write the tracks of a series; the file appears whole or not at all, an old one is replaced.
 
+    It is sealed with a hash of all that is written, by which ``read_tracks`` knows a file that was edited.
+
     Parameters
     ----------
     path : Path
@@ -51,7 +54,15 @@ def write_tracks(path: Path, tracks: DropletTracks, provenance: Mapping[str, Val
             group.create_dataset(name, data=values).attrs["units"] = unit_of(name)
         told: dict[str, Value] = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, "rate_hz": tracks.rate_hz}
         told |= {"half_window": tracks.half_window, "doubts": json.dumps(tracks.doubts)}
-        file.create_group(PROVENANCE).attrs.update({**provenance, **told})
+        kept = {**provenance, **told}
+        file.create_group(PROVENANCE).attrs.update(
+            {**kept, SEAL: seal_of({GROUP: {"": tracks.columns}}, _sealed(kept))}
+        )
+
+
+def _sealed(provenance: Mapping[str, Value]) -> dict[str, Value]:
+    """What of it a seal holds: all but how the file is laid out."""
+    return {name: value for name, value in provenance.items() if name not in SCHEMA_KEYS}
 
 
 def read_tracks(path: str | Path) -> StoredTracks:
@@ -65,7 +76,8 @@ def read_tracks(path: str | Path) -> StoredTracks:
     Raises
     ------
     DropletFileError
-        The file is missing, truncated, or not of tracks.
+        The file is missing, truncated, not of tracks, or was edited later. Files of older programs have no seal: edited
+        ones are not known.
     """
     try:
         with h5py.File(path, "r") as file:
@@ -74,4 +86,7 @@ def read_tracks(path: str | Path) -> StoredTracks:
     except (OSError, KeyError, ValueError) as error:
         raise DropletFileError(f"{path}: not a readable file of tracks: {error}") from error
     plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
-    return StoredTracks(columns, {name: value for name, value in plain.items() if name not in SCHEMA_KEYS})
+    provenance = _sealed(plain)
+    if provenance.pop(SEAL, None) not in (None, seal_of({GROUP: {"": columns}}, provenance)):
+        raise DropletFileError(f"{path}: was changed after its droplets had been linked: make the tracks again")
+    return StoredTracks(columns, provenance)

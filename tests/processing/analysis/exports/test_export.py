@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -178,6 +179,18 @@ def test_an_export_that_cannot_be_written_leaves_the_old_one(file: Path) -> None
     with pytest.raises(DropletFileError, match="droplets without z_mm have no place in space; export csv"):
         export_droplets(file, "vtk")
     assert file.with_suffix(".vtkhdf").read_text() == "old"
+
+
+@pytest.mark.parametrize("edited", ["u_m_s", "doubts"])
+def test_tracks_that_were_edited_are_refused(tracks: Path, tmp_path: Path, edited: str) -> None:
+    shutil.copy(tracks, file := tmp_path / "edited.h5")
+    with h5py.File(file, "r+") as opened:
+        if edited == "doubts":
+            opened["tomoshadow"].attrs["doubts"] = '["none"]'
+        else:
+            opened["tracks/u_m_s"][:] *= 1.5
+    with pytest.raises(DropletFileError, match="was changed after its droplets had been linked"):
+        read_tracks(file)
 
 
 def test_tracks_are_read_as_they_were_written(tracks: Path, file: Path) -> None:
