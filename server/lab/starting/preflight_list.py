@@ -156,7 +156,7 @@ def _references(context: Context, plan: RunPlan) -> Told | None:
     ]
     absent = [f"no {kind} run" for kind in REFERENCE_KINDS if kind not in kinds.values()]
     if absent or newer:
-        remedy = "choose it, or go on with what is chosen" if newer else "record it, or choose it in the form"
+        remedy = "choose it, or go on with what is chosen" if newer else "record what lacks, or choose it in the form"
         return ", ".join([*absent, *newer]), remedy
     return f"{', '.join(REFERENCE_KINDS)} fit this light", ""
 
