@@ -36,6 +36,7 @@ from processing.analysis.droplets.shadows.shadow_table import sized_droplets
 from processing.analysis.droplets.shadows.shadow_union import union_defects
 from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.analysis.droplets.verdicts.blind_views import blind_verdict, check_images
+from processing.analysis.droplets.verdicts.companions import judged_by_overlap
 from processing.analysis.droplets.verdicts.cut_sizes import judged_by_smallest
 from processing.analysis.droplets.verdicts.doubled import judged_by_copies
 from processing.analysis.droplets.verdicts.elongation import judged_by_length
@@ -151,7 +152,7 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     told = droplets.where(lump < 0).within(search.grid)
     hidden = _hidden(shot, fit, search, known, lump)
     exposure = MeasuredExposure(told, views, ratio, verdict, reasons, hidden=hidden)
-    exposure = judged_by_length(exposure, [view.elongation for view in views.values()])
+    exposure = judged_by_overlap(judged_by_length(exposure, [view.elongation for view in views.values()]))
     return judged_by_smallest(exposure, [view.complete_from_um for view in views.values()])
 
 
