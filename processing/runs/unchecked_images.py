@@ -27,8 +27,10 @@ PROPORTION = {
 }
 SINGLE_PROPORTION = Unchecked(
     "whether grey values are in proportion to light: of one view nothing tells a gamma, and one of 0.5 makes discs of "
-    "14 px 5 % too small, one of 2 as much too large",
-    "gamma 1 in the settings of the camera; or dots of known diameters, seen by the same camera",
+    "14 px 5 % too small, one of 2 as much too large. Nor whether contrast was stretched, or a threshold set before "
+    "images were made smaller: where a third of the light became black, such discs are 7 % too large",
+    "gamma 1 in the settings of the camera, and images as it has them; or dots of known diameters, seen by the same "
+    "camera",
 )
 """Of shadows in a single view."""
 LAMPS = Unchecked(

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,6 +37,12 @@ MOST_UNEVEN = 0.1
 """Of the light: a fit that leaves so much where no droplet is does not know it. 53 shadowgraphs of others: 0.06."""
 LEAST_SHARE = 0.5
 """Of the light that was given, which the brightest pixels of an image have: hardly a spray covers all of a view."""
+
+
+FEWEST_EDGES, LEAST_BETWEEN, LARGEST_SPOT = 50, 0.1, 0.02
+"""Pixels along edges of dark spots that tell whether a threshold made them; pixels between dark and light beside each:
+0.36 or more of sharp discs, 0.2 once contrast was doubled, 0 to 0.07 of two grey values through JPEG or with noise; and
+share of the image of the largest spot that is asked: masks and needles have edges of their own."""
 
 
 class LightError(BadInput):
@@ -107,6 +114,7 @@ def darkness_of(
     free = some[some < np.median(some) + 0.1]
     noise = 1.4826 * float(np.median(np.abs(free - np.median(free)))) if free.size else 0.0
     _require_known(values, noise, polarity, fitted=background is None)
+    _require_edges(values)
     return Darkness(values.astype(np.float32), rows.start or 0, columns.start or 0, noise, full)
 
 
@@ -116,6 +124,22 @@ def _require_unprocessed(grey: Image) -> None:
         raise LightError(
             "has 2 grey values: whoever set the threshold between them has set all sizes; give the image as the camera "
             "has it"
+        )
+
+
+def _require_edges(values: Image) -> None:
+    """Refuse spots whose edges have nothing between dark and light: a threshold was set before noise or JPEG came."""
+    dark = (values > 0.5).astype(np.uint8)
+    _, labels, boxes, _ = cv2.connectedComponentsWithStats(dark, connectivity=8)
+    spots = dark * (boxes[:, cv2.CC_STAT_AREA] < LARGEST_SPOT * values.size)[labels].astype(np.uint8)
+    square = np.ones((3, 3), np.uint8)
+    edges = np.count_nonzero(spots) - np.count_nonzero(cv2.erode(spots, square))
+    between = np.count_nonzero((np.abs(values - 0.5) < 0.25) & (cv2.dilate(spots, square) > 0))
+    if edges >= FEWEST_EDGES and between < LEAST_BETWEEN * edges:
+        raise LightError(
+            f"has spots of two grey values: {100 * between / edges:.0f} % of their edges, limit "
+            f"{100 * LEAST_BETWEEN:.0f} %, are between dark and light; whoever set the threshold has set all sizes; "
+            "give the image as the camera has it"
         )
 
 
