@@ -97,7 +97,7 @@ class Witness:
         return Darkness(
             max(pulses_s, default=seen_s) - seen_s,
             None if off is None else off.ended_s - seen_s,
-            () if off is None else tuple(_first_asked(later, seen_s, off)),
+            () if off is None else tuple(_first_asked(calls, off)),
         )
 
 
@@ -105,14 +105,18 @@ _GUARD = "run-guard"
 _WHO_CONTROLS = ("acquisition", "live", _GUARD)
 _WHO_ASKS = ("frames-", "begin shot-", "a question-", "disarm-")
 """Threads on which the thread of a run or a live view asks cameras."""
+_WHO_KNOWS = ((_GUARD,), ("acquisition", "live", *_WHO_ASKS))
+"""Who does not know at once what the other one was told."""
 
 
-def _first_asked(later: Sequence[Call], seen_s: float, off: Call) -> Iterator[str]:
-    """What was asked before the light was switched off, by who did that; the others may not know yet."""
-    theirs = (off.thread,) if off.thread == _GUARD else (off.thread, *_WHO_ASKS)
-    for call in later:
-        if seen_s <= call.began_s < off.began_s and call.thread.startswith(theirs):
-            yield f"{call.device}: {call.verb}"
+def _first_asked(calls: Sequence[Call], off: Call) -> Iterator[str]:
+    """What whoever had seen a fault still asked before the light was off."""
+    for threads in _WHO_KNOWS:
+        theirs = [call for call in calls if call.thread.startswith(threads)]
+        seen_s = min((call.ended_s for call in theirs if call.shows_fault), default=float("inf"))
+        for call in theirs:
+            if seen_s <= call.began_s < off.began_s and call.verb != "off":
+                yield f"{call.device}: {call.verb}"
 
 
 @dataclass(frozen=True)
@@ -126,7 +130,7 @@ class Darkness:
     confirmed_s : float | None
         Until the generator had said that it is disarmed and dark; None if it never did.
     asked_before : tuple[str, ...]
-        What was asked of any device before the light was switched off.
+        What was asked of any device, by a thread that knew of the fault, before the light was switched off.
     """
 
     last_pulse_s: float
