@@ -22,6 +22,8 @@ FIELD_WINDOW_PX = 201
 """Over which the light field is estimated where the settings state no window."""
 LEAST_LIGHT, MOST_LIGHT = 1 / 64, 0.98
 """Of the full scale: a background that is darker or brighter tells no transmission."""
+LEAST_PATTERN = 0.005
+"""Of the light: pixels of a mosaic whose levels differ by less are left as they are; of grey images it is 0.0002."""
 DIM = 1 / 8
 """Of the full scale: a frame without a brighter pixel is dim."""
 
@@ -130,13 +132,49 @@ def transmission(
     (rows, columns) float32 array
         Inverse variance relative to a typical pixel, as of counted light; 0 where the background is
         dark or saturated, where the image is 1.
+
+    Notes
+    -----
+    A mosaic of colours that the background does not show is divided out, too: see ``without_mosaic``.
     """
     light, known = background - dark, known_light(background, dark, bits=bits)
     sure = np.where(known, light, np.float32(0))
     if known.any():
         sure /= np.median(sure[known])
     image = np.where(known, (grey - dark) / np.where(known, light, np.float32(1)), np.float32(1))
-    return image.astype(np.float32), sure.astype(np.float32)
+    return without_mosaic(image.astype(np.float32), known), sure.astype(np.float32)
+
+
+def without_mosaic(image: Intensity, known: NDArray[np.bool_]) -> Intensity:
+    """Transmissions without the pattern of a mosaic, two by two pixels, by which some get less light than others.
+
+    So it is left where raw values behind a mosaic of colours are divided by a background that was made grey, or the
+    other way round. Droplets darken neighbours alike, so that ratios of pixels to their neighbours tell it.
+
+    Parameters
+    ----------
+    image : (rows, columns) float32 array
+        Transmissions.
+    known : (rows, columns) bool array
+        Pixels that count.
+
+    Returns
+    -------
+    (rows, columns) float32 array
+        With the mean of four neighbours as before; the same image where none differ.
+    """
+    rows, columns = (2 * (side // 2) for side in image.shape)
+    blocks = image[:rows, :columns].reshape(rows // 2, 2, columns // 2, 2)
+    whole = known[:rows, :columns].reshape(blocks.shape).all(axis=(1, 3)) & (blocks.mean(axis=(1, 3)) > LEAST_LIGHT)
+    if not whole.any():
+        return image
+    four = blocks.transpose(0, 2, 1, 3)[whole]
+    levels = np.median(four / four.mean(axis=(1, 2), keepdims=True), axis=0)
+    levels /= levels.mean()
+    if np.ptp(levels) < LEAST_PATTERN or levels.min() <= 0:
+        return image
+    pattern = np.tile(levels, (rows // 2 + 1, columns // 2 + 1))[: image.shape[0], : image.shape[1]]
+    return np.where(known, image / pattern, image).astype(np.float32)
 
 
 def known_light(background: Intensity, dark: Intensity | np.float32, *, bits: int) -> NDArray[np.bool_]:

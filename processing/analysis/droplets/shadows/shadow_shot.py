@@ -45,6 +45,7 @@ from processing.analysis.droplets.verdicts.improbable import judged_by_probabili
 from processing.analysis.droplets.verdicts.twins import ghosts_within, judged_by_twins, moved
 from processing.analysis.hidden import Hidden
 from processing.kernels import DEFAULT_THREADS
+from processing.preprocessing import without_mosaic
 
 ShadowExposure = MeasuredExposure[SizedDroplets, SeenShadows]
 
@@ -96,6 +97,7 @@ def measure_shadows(
     check_images(images, search)
     trusts = [np.ones(np.shape(image), np.float32) for image in images] if trust is None else trust
     check_images(trusts, search)
+    images = [without_mosaic(image, trust > 0) for image, trust in zip(images, trusts, strict=True)]
     if reasons := unmeasurable(images, trusts, search):
         return _refused(*reasons)
     shot = looking(images, trusts, search, threads)

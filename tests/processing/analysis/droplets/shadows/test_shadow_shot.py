@@ -249,6 +249,18 @@ def test_pixels_behind_a_mosaic_of_colours_are_no_empty_view(scene: ShadowScene,
     assert np.mean(match >= 0) > 0.97
 
 
+def test_a_mosaic_that_the_background_does_not_show_is_divided_out(scene: ShadowScene, shot: ShadowExposure) -> None:
+    """Raw values of a camera for colours over a background that was made grey: the view was told as *empty*."""
+    rows, columns = np.indices(scene.images[0].shape) % 2
+    levels = np.array([[0.6, 1.4], [1.4, 0.6]], np.float32)[rows, columns]
+    told = measure_shadows([image * levels for image in scene.images], search_of(scene, MARGIN_VOXEL))
+    assert told.verdict is ShotVerdict.GOOD, told.reasons
+    match, _ = matches(told.droplets.points_mm, shot.droplets.points_mm, 0.2 * scene.grid.pitch_mm)
+    assert np.mean(match >= 0) > 0.97
+    own, other = told.droplets.diameters_um[match >= 0], shot.droplets.diameters_um[match[match >= 0]]
+    np.testing.assert_allclose(own.mean(), other.mean(), rtol=0.005)
+
+
 def test_images_without_droplets_are_empty_and_a_covered_view_is_named(scene: ShadowScene) -> None:
     rng, search = np.random.default_rng(0), search_of(scene, MARGIN_VOXEL)
     empty = [rng.normal(1, 0.012, image.shape).astype(np.float32) for image in scene.images]
