@@ -61,7 +61,7 @@ def _faster(flying: Flying) -> Iterator[str]:
 
 def _against(flying: Flying) -> Iterator[str]:
     """Shots that fly against most others: their mean may be next to nothing, and no axis contradicts it."""
-    ways = [(shot, way) for shot, rows in flying if (way := _way(rows)) is not None]
+    ways = [(shot, way) for shot, rows in flying if (way := way_of(rows)) is not None]
     if not ways:
         return
     units = np.array([way for _, way in ways])
@@ -83,8 +83,10 @@ def _flying(shot: StoredDroplets) -> FloatArray | None:
     return np.asarray(flying) if len(flying) >= FEWEST_PAIRS else None
 
 
-def _way(velocities_m_s: FloatArray) -> FloatArray | None:
-    """Unit vector along which droplets fly; None where they fly anywhere."""
+def way_of(velocities_m_s: FloatArray) -> FloatArray | None:
+    """Unit vector (3,) along which droplets of these velocities (N, 3) fly; None where they fly anywhere, or N is 0."""
+    if not len(velocities_m_s):
+        return None
     mean, speed = velocities_m_s.mean(axis=0), float(np.linalg.norm(velocities_m_s, axis=1).mean())
     amount = float(np.linalg.norm(mean))
     return np.asarray(mean / amount) if amount > TOGETHER * speed else None

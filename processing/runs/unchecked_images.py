@@ -101,16 +101,21 @@ SPARSE = Unchecked(
 
 CROPPED = Unchecked(
     "whether images of target and shots were cut alike: that rows were cut elsewhere in all views moves all droplets "
-    "along y, and everything agrees",
-    "nothing where OffsetY and Height were the same for both; else images of the target that are cut as the shots are",
+    "along y, and everything agrees. So it does where all images of the shots, not of the target, are upside down: y, "
+    "and velocities along it, have the wrong sign then",
+    "nothing where OffsetY, Height and ReverseY were the same for both; else images of the target that are cut and "
+    "turned as the shots are; [spray] nozzle and direction tell droplets that fly against them",
 )
 """Of images from elsewhere; a rig reads whole images, of target and shots alike."""
 
 
 MOVED = Unchecked(
     "whether all views still look where they did at the target: a frame with all cameras that sank, or a target that "
-    "stood elsewhere than was stated, moves all droplets along y, and everything agrees",
-    "nothing where only the differences of places count; else images of the target, or of the nozzle, of the same day",
+    "stood elsewhere than was stated, moves all droplets along y, and everything agrees. So it does where all images "
+    "of the shots, not of the target, are upside down: y, and velocities along it, have the wrong sign then",
+    "nothing where only the differences of places count, and settings of the cameras are those of the target; else "
+    "images of the target, or of the nozzle, of the same day; [spray] nozzle and direction tell droplets that fly "
+    "against them",
 )
 """Of runs of a rig: what moves all views alike along y moves no line of sight away from the others."""
 
@@ -128,7 +133,7 @@ VALUES: dict[Polarity, Unchecked] = {
 
 
 def unknown_height(header: RunHeader) -> Unchecked:
-    """What nothing tells of how high all views look: images from elsewhere may be cut, cameras of a rig may sink."""
+    """What nothing tells of how high all views look, and which side is up: images may be cut, cameras may sink."""
     return CROPPED if "import" in header.configuration else MOVED
 
 

@@ -1,6 +1,6 @@
 """What became of a shot that was measured: its droplets, its velocities, and whether to believe them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -12,6 +12,7 @@ from processing.analysis.droplets.ghost_share import pooled, told_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure
 from processing.analysis.estimates import Estimate
+from processing.analysis.shot_doubts import AGAINST, FEWEST_PAIRS, way_of
 from processing.analysis.unlike_numbers import unlike_numbers
 from processing.analysis.unlike_sizes import unlike_sizes
 from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
@@ -96,24 +97,37 @@ def droplets_path(results_dir: Path, shot: int) -> Path:
 
 
 def shot_velocities(
-    exposures: Sequence[Exposure], grid: VoxelGrid, separation: Separation | str
+    exposures: Sequence[Exposure],
+    grid: VoxelGrid,
+    separation: Separation | str,
+    axis: Sequence[float] | None = None,
 ) -> tuple[MeasuredVelocities | None, ShotVelocity | str]:
-    """Velocities of a shot and what to tell of them, or why there are none."""
+    """Velocities of a shot and what to tell of them, or why there are none.
+
+    Parameters
+    ----------
+    exposures : sequence of MeasuredExposure
+        A and B.
+    grid : VoxelGrid
+        In which they were measured.
+    separation : Separation | str
+        From A to B, or why nobody knows it.
+    axis : (3,) sequence of float, optional
+        Along which the spray leaves its nozzle, of any length, where somebody has stated it.
+    """
     if isinstance(separation, str):
         return None, separation
     first, second = exposures
     velocities = measure_velocities(first, second, grid, separation.mean_ns)
-    return velocities, _told_velocity(velocities, separation)
+    return velocities, _told_velocity(velocities, separation, axis)
 
 
-def _told_velocity(velocities: MeasuredVelocities, separation: Separation) -> ShotVelocity:
+def _told_velocity(
+    velocities: MeasuredVelocities, separation: Separation, axis: Sequence[float] | None
+) -> ShotVelocity:
     verdict, reasons = velocities.verdict, velocities.reasons
-    if velocities.pairs and separation.spread_ns > MOST_SPREAD * separation.mean_ns:
-        doubt = (
-            f"separations of the views differ by {separation.spread_ns:g} ns, limit {100 * MOST_SPREAD:g} % of "
-            f"{separation.mean_ns:g} ns: they see droplets at different times"
-        )
-        verdict, reasons = ShotVerdict.DOUBTFUL, (*reasons, doubt)
+    if velocities.pairs and (doubts := (*_uneven(separation), *_against(velocities, axis))):
+        verdict, reasons = ShotVerdict.DOUBTFUL, (*reasons, *doubts)
     return ShotVelocity(
         verdict=verdict,
         reasons=reasons,
@@ -126,6 +140,26 @@ def _told_velocity(velocities: MeasuredVelocities, separation: Separation) -> Sh
         separation_ns=separation.mean_ns,
         separation_source=separation.source,
     )
+
+
+def _uneven(separation: Separation) -> Iterator[str]:
+    if separation.spread_ns > MOST_SPREAD * separation.mean_ns:
+        yield (
+            f"separations of the views differ by {separation.spread_ns:g} ns, limit {100 * MOST_SPREAD:g} % of "
+            f"{separation.mean_ns:g} ns: they see droplets at different times"
+        )
+
+
+def _against(velocities: MeasuredVelocities, axis: Sequence[float] | None) -> Iterator[str]:
+    """Whether droplets fly to where the spray is stated to come from."""
+    way = way_of(velocities.first.velocities_m_s[velocities.first.paired])
+    if axis is None or way is None or velocities.pairs < FEWEST_PAIRS:
+        return
+    if way @ np.array(axis) < AGAINST * np.linalg.norm(axis):
+        yield (
+            f"droplets fly along {', '.join(f'{part:.1f}' for part in way)}, against the stated axis of the spray: are "
+            "images upside down, or exposures A and B exchanged? Velocities have the wrong sign then"
+        )
 
 
 def shot_summary(

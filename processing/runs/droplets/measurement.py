@@ -16,6 +16,7 @@ from processing.analysis.droplets.droplet_search import DropletSearch, plan_drop
 from processing.analysis.droplets.shadows.shadow_shot import measure_shadows
 from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.analysis.near_or_far import SIGHTS, depth_reversed
+from processing.analysis.stored_json import stored_json
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
 from processing.kernels import DEFAULT_THREADS
@@ -165,7 +166,8 @@ class RunMeasurement:
         frames = frame_names(self.run)
         measured = [self._exposure(recorded, frame, threads, should_stop) for frame in frames]
         exposures = tuple(exposure for exposure, _ in measured)
-        velocities, velocity = shot_velocities(exposures, self.search.grid, separation_of(self.run, recorded))
+        separation, axis = separation_of(self.run, recorded), stored_json(self.conditions, "spray").get("axis")
+        velocities, velocity = shot_velocities(exposures, self.search.grid, separation, axis)
         by_frame = dict(zip(frames, exposures := compared(exposures, velocities), strict=True))
         seen = {frame: exposure.droplets for frame, exposure in by_frame.items() if exposure.views}
         objects = self.objects.measure(recorded, seen, threads)

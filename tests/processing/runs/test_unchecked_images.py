@@ -33,3 +33,4 @@ def test_nothing_tells_how_high_all_views_look_of_a_rig_or_of_images_from_elsewh
     told = unchecked_images.unknown_height(header)
     assert why in told.what
     assert "moves all droplets along y" in told.what
+    assert "where all images of the shots, not of the target, are upside down: y, and velocities along it" in told.what

@@ -4,12 +4,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict
 from processing.analysis.droplets.shadows.seen_shadows import SeenShadows
 from processing.analysis.hidden import Hidden
-from processing.runs.droplets.measured_shot import shot_summary
+from processing.runs.droplets.measured_shot import shot_summary, shot_velocities
+from processing.runs.shots.separation import Separation
+from processing.volume import VoxelGrid
 
 
 def exposure(
@@ -55,3 +58,33 @@ def test_whoever_doubts_an_exposure_no_droplet_of_it_is_told_to_be_real() -> Non
     assert np.isnan(doubted.droplets.p_real).all()
     assert not np.isnan(good.doubted(()).droplets.p_real).any()
     assert doubted.doubted(("first",), before=True).reasons == ("first", "another scale")
+
+
+def flown(way_mm: tuple[float, float, float]) -> tuple[str, str]:
+    """Verdict and reasons of droplets that have flown, of a spray that is stated to leave along y."""
+    rng, count = np.random.default_rng(5), 80
+    places, scatter = rng.uniform(0.5, 3.4, (count, 3)), rng.normal(0, 2e-4, (count, 3))
+    pair = [replace(exposure(count), droplets=placed(points)) for points in (places, places + way_mm + scatter)]
+    grid = VoxelGrid((200, 200, 200), (0.0, 0.0, 0.0), 0.02)
+    _, told = shot_velocities(pair, grid, Separation(6400.0, 0.0, "stated"), (0.0, 2.0, 0.0))
+    assert not isinstance(told, str)
+    return told.verdict, " ".join(told.reasons)
+
+
+def placed(points_mm: np.ndarray) -> SizedDroplets:
+    count = len(points_mm)
+    ones, covariance = np.ones(count), np.tile(1e-8 * np.eye(3), (count, 1, 1))
+    return SizedDroplets(points_mm, covariance, 40 * ones, 40 * ones, ones, np.full(count, 4), ones, ones)
+
+
+@pytest.mark.parametrize("way_mm", [(0.0, -0.1, 0.0), (0.04, -0.1, 0.03)])
+def test_droplets_that_fly_to_the_nozzle_are_doubtful(way_mm: tuple[float, float, float]) -> None:
+    """All images upside down, or A and B exchanged, explain everything as well."""
+    verdict, reasons = flown(way_mm)
+    assert verdict == "doubtful"
+    assert "against the stated axis of the spray: are images upside down, or exposures A and B exchanged?" in reasons
+
+
+@pytest.mark.parametrize("way_mm", [(0.0, 0.1, 0.0), (0.1, -0.02, 0.0)])
+def test_droplets_that_fly_along_the_spray_or_across_are_good(way_mm: tuple[float, float, float]) -> None:
+    assert flown(way_mm) == ("good", "")
