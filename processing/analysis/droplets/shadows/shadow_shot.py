@@ -43,6 +43,7 @@ from processing.analysis.droplets.verdicts.elongation import judged_by_length
 from processing.analysis.droplets.verdicts.hidden_volume import judged_by_volume
 from processing.analysis.droplets.verdicts.improbable import judged_by_probability
 from processing.analysis.droplets.verdicts.twins import ghosts_within, judged_by_twins, moved
+from processing.analysis.droplets.verdicts.unexplained_shadows import judged_by_unexplained, unexplained_shadows
 from processing.analysis.hidden import Hidden
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import without_mosaic
@@ -155,6 +156,7 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     hidden = _hidden(shot, fit, search, known, lump)
     exposure = MeasuredExposure(told, views, ratio, verdict, reasons, hidden=hidden)
     exposure = judged_by_overlap(judged_by_length(exposure, [view.elongation for view in views.values()]))
+    exposure = judged_by_unexplained(exposure, unexplained_shadows(asked.images, shadows.transmissions, asked.weights))
     return judged_by_smallest(exposure, [view.complete_from_um for view in views.values()])
 
 
