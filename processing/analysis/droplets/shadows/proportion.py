@@ -5,7 +5,6 @@ they are fitted anew to several powers of the images, and the one is told that e
 """
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +28,10 @@ where the power is 1, and -0.36 where a tenth of many droplets are ghosts; 0.4 t
 1.0 to 1.2 where they have that of sRGB."""
 WRONG_BY = 20.0
 """Percent of the diameters per step; glare around shadows, as of a tenth of the light, looks like one, and costs 2."""
-LEAST_BEND = 0.015
-"""Of the logarithms of what powers a step below and above leave, over what the images do: 0.06 to 0.2, but 0.004 where
-droplets of one size are hardly larger than their blur, which then explains much of what a power does."""
+RESOLVED, FEWEST_RESOLVED = 0.6, 2
+"""Share of the light that a droplet takes at its centre which is 1.35 times as wide as its blur, and how many such ones
+there must be. Where all are smaller, as 35 droplets of 24 or 30 um behind a blur of 0.8 px, blur and diameters explain
+what powers above 1 do, and steps of 0.4 to 2 were told where the power is 1."""
 FEWEST_VIEWS = 3
 """Two views hardly tell blur from diameters."""
 
@@ -41,15 +41,13 @@ def proportion_doubts(shot: Transmissions, search: DropletSearch, fit: ShadowFit
 
     Nor do edges behind a blur narrower than pixels: how these fall off is the pixels' doing.
     """
-    asked = depths(shot, fit) > PALE
-    resolved = ShadowRounds(shot, search).resolves_light(fit)
+    taken = depths(shot, fit)
+    asked, wide = taken > PALE, np.count_nonzero(taken > RESOLVED)
+    resolved = wide >= FEWEST_RESOLVED and ShadowRounds(shot, search).resolves_light(fit)
     if np.count_nonzero(asked) < LEAST_DROPLETS or len(shot.images) < FEWEST_VIEWS or not resolved:
         return ()
-    left = cache(lambda step: _left(shot, search, fit, STEP**step)[asked])
-    below, here, above = (float(np.log(np.maximum(left(step), 1e-12)).mean()) for step in (-1, 0, 1))
-    if below + above - 2 * here < LEAST_BEND:
-        return ()
-    return _told(least_left(left, -MOST_STEPS, MOST_STEPS))
+    found = least_left(lambda step: _left(shot, search, fit, STEP**step)[asked], -MOST_STEPS, MOST_STEPS)
+    return _told(found)
 
 
 def _told(found: LeastLeft) -> tuple[str, ...]:
