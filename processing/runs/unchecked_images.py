@@ -19,8 +19,10 @@ PROPORTION = {
     "shadow": Unchecked(
         "whether grey values are in proportion to light: a gamma near to 1 fits shadows that are a little smaller or "
         "larger; one that is far from 1, as sRGB has, is told where ten droplets or more are dark in three views, or "
-        "look veiled. Nor whether black is where the dark image says so, where all droplets are hardly larger than "
-        "their blur: they are 4 % too small where 8 % of the light is left, and look alike",
+        "look veiled. Nor whether black is where the dark image says so to better than some percent of the light: "
+        "stray light of 3 % makes droplets 1 % too small, a dark image that is too bright by 6 % makes them 3 % too "
+        "large; and where all are hardly larger than their blur, they are 4 % too small where 8 % of the light is "
+        "left, and look alike",
         "gamma 1 in the settings of the cameras, and a dark image; or --sizes: dots of known diameters, seen by the "
         "same cameras",
     ),
