@@ -25,10 +25,15 @@ def of_another_run(file: Path, provenance: Mapping[str, Any]) -> str:
 
 def run_around(file: Path) -> RunHeader | None:
     """The run in whose results a file lies; None if it lies elsewhere, or nobody can read the run."""
+    run_dir = directory_around(file)
+    return _header(run_dir, (run_dir / RUN_FILE).stat().st_ctime_ns) if run_dir else None
+
+
+def directory_around(file: Path) -> Path | None:
+    """Directory of that run, whether anybody can read it or not."""
     folders = file.resolve().parents
-    if len(folders) < 3 or folders[1].name != "results" or not (header := folders[2] / RUN_FILE).is_file():
-        return None
-    return _header(folders[2], header.stat().st_ctime_ns)
+    is_around = len(folders) > 2 and folders[1].name == "results" and (folders[2] / RUN_FILE).is_file()
+    return folders[2] if is_around else None
 
 
 @lru_cache(maxsize=64)

@@ -195,26 +195,21 @@ def _measure_shots(
             for export in options.export:
                 export_droplets(out / shots[-1].file, export)
             _tell_faults(shots[-1])
-    return _result(options, settings, run_dir, shots, [out / shot.file for shot in shots])
+    return _result(settings, shots, [out / shot.file for shot in shots])
 
 
-def _result(
-    options: Namespace, settings: "MeasureSettings", run_dir: Path, shots: "list[ShotDroplets]", files: list[Path]
-) -> dict[str, Any]:
+def _result(settings: "MeasureSettings", shots: "list[ShotDroplets]", files: list[Path]) -> dict[str, Any]:
     """What the shots say together, of which people are told what casts doubt, and what nothing checks."""
-    from daq.files.run_directory import RunReader
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.droplets.droplet_statistics import droplet_statistics
     from processing.analysis.velocity.velocity_statistics import velocity_statistics
-    from processing.calibration.calibration_file import load_calibration
     from processing.runs.droplets.measure_settings import METHOD_VERSION
     from processing.runs.droplets.told_together import told_together
     from processing.runs.liquid.objects import liquid_summary
     from processing.runs.recipe import recipe_sha256
 
     stored = [read_droplets(file) for file in files]
-    with RunReader(run_dir) as run:
-        together = told_together(run, load_calibration(options.calibration), stored, files)
+    together = told_together(stored, files)
     for told in (*together.doubts, *(one.text for one in together.not_checked)):
         progress(told)
     return {

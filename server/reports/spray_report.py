@@ -14,13 +14,13 @@ from daq.counted import counted
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.spray.density_map import NO_CELLS, density_maps
 from processing.analysis.spray.spray_sample import SpraySample, spray_sample
-from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
+from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics
 from processing.analysis.spray.velocity_field import field_across_axis, field_through_axis
 from processing.figures.sprays.distribution_figure import distribution_figure
 from processing.figures.sprays.field_figure import velocity_field_figure
 from processing.figures.sprays.motion_figure import motion_figure
 from processing.figures.sprays.space_figures import density_figure, patternation_figure
-from processing.runs.sprays.measured_spray import MeasuredSpray
+from processing.runs.sprays.measured_spray import MeasuredSpray, told_spray
 from server.reports.liquid_sections import ReportedLiquid, break_up_section, liquid_rows, unknown_section
 from server.reports.object_motion_section import object_motion_section
 from server.reports.origin_section import notes_of, origin_of
@@ -79,7 +79,7 @@ class ReportedSpray:
     @classmethod
     def of(cls, spray: MeasuredSpray, asked: AskedFor) -> "ReportedSpray":
         """Compute what is reported."""
-        told = spray_statistics(spray.shots, asked)
+        told = told_spray(spray, asked)
         return cls(spray, asked, told, spray_sample(spray.shots) if told.classes else None)
 
 

@@ -43,6 +43,7 @@ from processing.runs.measured_images import (
     require_backgrounds,
     require_fitting,
 )
+from processing.runs.not_checked import KNOWN, KnownImages
 from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results, provenance_of
 from processing.runs.shots.separation import separation_of
@@ -77,7 +78,7 @@ class RunMeasurement:
     objects : RunObjects
         How liquid that is no droplet is looked for.
     conditions : dict of str to str
-        What held of the run when the measurement was planned, whatever is mended meanwhile.
+        What held of the run and was known of its images when the measurement was planned, whatever is mended meanwhile.
     light : RunLight
         In which shots with few droplets are, as others of the run say.
     """
@@ -126,9 +127,12 @@ class RunMeasurement:
             require_backgrounds(run, references)
         require_fitting(settings.ignored, {view: calibration.views[view].mapping.image_size_px for view in views})
         provenance = provenance_of(run, calibration, calibration_file, settings, METHOD_VERSION)
+        known = {KNOWN: KnownImages.of(run.header, calibration, grid).model_dump_json()}
         objects = RunObjects.of(run, calibration, references, grid, settings.nozzle, settings.ignored)
         light = RunLight(run, search, references, settings.ignored)
-        return cls(run, calibration, settings, search, references, provenance, objects, conditions_of(run), light)
+        return cls(
+            run, calibration, settings, search, references, provenance, objects, conditions_of(run) | known, light
+        )
 
     def measure(
         self,

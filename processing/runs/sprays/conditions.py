@@ -7,7 +7,9 @@ from typing import Any
 
 from daq.files.run_directory import NotesChange, RunConditions, RunNotes, RunReader, ShotFileError, Spray
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.stored_json import stored_json
+from processing.runs.run_around import directory_around, run_around
 
 CHANGED = "conditions_changed"
 """Of a file of droplets: who changed the conditions before it was measured, when, and what was recorded."""
@@ -31,28 +33,24 @@ def _told(notes: RunNotes, spray: Spray | None) -> dict[str, str]:
     return {name: text for name, text in texts.items() if text not in ("", "{}")}
 
 
-def run_around(file: Path) -> RunReader | None:
-    """The run in whose results a file lies; None where it lies elsewhere, or nobody can read the run."""
-    folders = file.resolve().parents
-    if len(folders) < 3 or not (folders[2] / "run.h5").is_file():
-        return None
-    run = RunReader(folders[2])
-    try:
-        _ = run.header
-    except ShotFileError:
-        return None  # damaged: its droplets are good all the same
-    return run
+def axis_of(shots: Sequence[StoredDroplets], files: Sequence[Path]) -> SprayAxis | None:
+    """As the files say; where they do not, as the run around them does: they are older, or it was stated later."""
+    stated = next((told for shot in shots if (told := stored_json(shot.provenance, "spray"))), None)
+    if stated:
+        return SprayAxis(tuple(stated["nozzle_mm"]), tuple(stated["axis"]))
+    spray = _spray_around(files[0])
+    return SprayAxis(spray.nozzle_mm, spray.axis) if spray else None
 
 
-def spray_around(file: Path) -> Spray | None:
+def _spray_around(file: Path) -> Spray | None:
     """Nozzle and axis, as the run around a file says now; later notes that are damaged do not count."""
-    run = run_around(file)
-    if run is None:
+    header, run_dir = run_around(file), directory_around(file)
+    if header is None or run_dir is None:
         return None
     try:
-        return run.conditions.spray
+        return RunReader(run_dir).conditions.spray
     except ShotFileError:
-        return run.header.spray
+        return header.spray
 
 
 def changes_told(shots: Sequence[StoredDroplets], files: Sequence[Path]) -> tuple[str, ...]:
@@ -69,11 +67,11 @@ def _of_shot(provenance: Mapping[str, Any], file: Path) -> Iterator[str]:
     if changed := stored_json(provenance, CHANGED):
         differs = _differences(measured, _said(changed["recorded"]), "recorded")
         yield f"run {name} was changed by {changed['who']} at {changed['at_utc']}, after it was recorded: {differs}"
-    run = run_around(file)
-    if run is None:
+    run_dir = directory_around(file)
+    if run_dir is None:
         return
     try:
-        now = run.conditions
+        now = (run := RunReader(run_dir)).conditions
     except ShotFileError as error:
         yield f"whether run {name} was changed later is not known: {error}"
         return

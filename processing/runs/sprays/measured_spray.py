@@ -16,10 +16,12 @@ from processing.analysis.lingering_droplets import lingering_told
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_doubts import NOT_STATED, noted
 from processing.analysis.spray.spray_sample import box_told
+from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
 from processing.analysis.stored_json import stored_json
 from processing.count import counted
 from processing.runs.droplets_in_place import read_in_place
-from processing.runs.sprays.conditions import changes_told, spray_around
+from processing.runs.not_checked import not_checked
+from processing.runs.sprays.conditions import axis_of, changes_told
 
 PATTERN = "shot_*_droplets.h5"
 MOST_UNLIKE = 1.25
@@ -59,6 +61,13 @@ class MeasuredSpray:
         return tuple(dict.fromkeys(str(shot.provenance.get("run", "")) for shot in self.shots))
 
 
+def told_spray(spray: MeasuredSpray, asked: AskedFor) -> SprayStatistics:
+    """All figures of a spray, and what nothing checks of the images that they come from."""
+    told = spray_statistics(spray.shots, asked)
+    of_images = not_checked(spray.shots, directed=asked.axis is not None)
+    return told.model_copy(update={"not_checked": (*told.not_checked, *of_images)})
+
+
 def read_spray(folders: Sequence[Path]) -> MeasuredSpray:
     """Read the shots of results of ``measure``; a folder may hold those of several runs in folders of their names.
 
@@ -84,7 +93,7 @@ def read_files(files: Sequence[Path], name: str = "") -> MeasuredSpray:
     _require_one(shots, files, "calibration")
     require_poolable(shots)
     _require_one(shots, files, "spray")
-    return MeasuredSpray(name, shots, _axis(shots, files), changes_told(shots, files))
+    return MeasuredSpray(name, shots, axis_of(shots, files), changes_told(shots, files))
 
 
 def measured_in(folder: Path) -> Path:
@@ -134,15 +143,6 @@ def _require_one(shots: Sequence[StoredDroplets], files: Sequence[Path], what: s
                 f"{file}: measured with {what} {its}, {files[0]} with {first}: numbers of two are not pooled; "
                 f"take those of one, or --compare them{AGAIN.get(what, '')}"
             )
-
-
-def _axis(shots: Sequence[StoredDroplets], files: Sequence[Path]) -> SprayAxis | None:
-    """As the files say; where they do not, as the run around them does: they are older, or it was stated later."""
-    stated = next((told for shot in shots if (told := stored_json(shot.provenance, "spray"))), None)
-    if stated:
-        return SprayAxis(tuple(stated["nozzle_mm"]), tuple(stated["axis"]))
-    spray = spray_around(files[0])
-    return SprayAxis(spray.nozzle_mm, spray.axis) if spray else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,9 +42,9 @@ def statistics(options: Namespace) -> Outcome:
 
 
 def _told(options: Namespace, spray: "MeasuredSpray") -> "SprayStatistics":
-    from processing.analysis.spray.spray_statistics import spray_statistics
+    from processing.runs.sprays.measured_spray import told_spray
 
-    return spray_statistics(spray.shots, asked_for(options, spray))
+    return told_spray(spray, asked_for(options, spray))
 
 
 def _compare(options: Namespace) -> Outcome:
@@ -64,7 +64,9 @@ def _compare(options: Namespace) -> Outcome:
         "reason": None if found else NOTHING,
     }
     differing = [*sprays.conditions, *(f"measured differently: {one}" for one in sprays.unlike)]
-    texts = [*(_text(spray, told[name]) for name, spray in sprays.sprays.items()), *differing, *alone]
+    unchecked = dict.fromkeys(one.text for its in told.values() for one in its.not_checked)
+    of_each = [_text(spray, told[name].model_copy(update={"not_checked": ()})) for name, spray in sprays.sprays.items()]
+    texts = [*of_each, *differing, *alone, "\n".join(unchecked)]
     return Outcome(result, "\n\n".join([*texts, _differences(found) if found else NOTHING]))
 
 

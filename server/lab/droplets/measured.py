@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from daq.files.run_directory import RunReader, ShotFileError
+from daq.files.later_notes import NOTES_FILE
 from daq.files.run_file import RUN_FILE
 from daq.frozen_model import FrozenModel
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
@@ -14,13 +14,9 @@ from processing.analysis.droplets.droplet_statistics import DropletStatistics, d
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.stored_json import stored_json
 from processing.analysis.velocity.velocity_statistics import VelocityStatistics, velocity_statistics
-from processing.calibration.calibration import Calibration
-from processing.calibration.calibration_file import file_sha256, load_calibration
-from processing.calibration.errors import CalibrationError
 from processing.runs.droplets.measured_shot import droplets_path
 from processing.runs.droplets.told_together import ToldTogether, told_together
 from processing.runs.droplets_in_place import read_in_place
-from server.lab.calibrations import CalibrationStore
 from server.lab.errors import Damaged, NotFound
 from server.lab.results import droplet_summaries
 
@@ -52,15 +48,8 @@ class MeasuredRun(FrozenModel):
         return (*self.together.doubts, *self.velocity.doubts)
 
 
-def measured_run(results_dir: Path, calibrations: CalibrationStore) -> MeasuredRun:
-    """Read the droplets of a result set.
-
-    Parameters
-    ----------
-    results_dir : Path
-        In the folder of its run.
-    calibrations : CalibrationStore
-        Where that one is by which they were measured.
+def measured_run(results_dir: Path) -> MeasuredRun:
+    """Read the droplets of a result set, in the folder of its run; they are told though nobody can read the run.
 
     Raises
     ------
@@ -73,10 +62,9 @@ def measured_run(results_dir: Path, calibrations: CalibrationStore) -> MeasuredR
     if not paths:
         raise NotFound(f"{results_dir.parents[1].name} has no droplets in {results_dir.name}")
     try:
-        changes = len(RunReader(results_dir.parents[1]).notes_changes)
         files = tuple((path, path.stat().st_mtime_ns) for path in paths)
-        return _read(files, (run_changed_ns(results_dir), changes), calibrations)
-    except (DropletFileError, ShotFileError, OSError) as error:
+        return _read(files, run_changed_ns(results_dir))
+    except (DropletFileError, OSError) as error:
         raise Damaged(str(error)) from error
 
 
@@ -97,42 +85,28 @@ def droplets_of(results_dir: Path, shot: int) -> StoredDroplets:
         raise Damaged(str(error)) from error
 
 
-def run_changed_ns(results_dir: Path) -> int:
-    """When the header of the run around came to its place: what was read in another run does not count; 0 of none."""
-    header = results_dir.parents[1] / RUN_FILE
-    return header.stat().st_ctime_ns if header.is_file() else 0
+def run_changed_ns(results_dir: Path) -> tuple[int, ...]:
+    """When header and later notes of the run around came to their places: what was read before is not what holds."""
+    files = (results_dir.parents[1] / name for name in (RUN_FILE, NOTES_FILE))
+    return tuple(file.stat().st_ctime_ns if file.is_file() else 0 for file in files)
 
 
 @lru_cache(maxsize=8)
-def _droplets(path: Path, _changed_ns: int, _run_changed_ns: int) -> StoredDroplets:
+def _droplets(path: Path, _changed_ns: int, _run_changed_ns: tuple[int, ...]) -> StoredDroplets:
     return read_in_place(path)
 
 
 @lru_cache(maxsize=16)
-def _read(
-    files: tuple[tuple[Path, int], ...], _run_changed: tuple[int, int], calibrations: CalibrationStore
-) -> MeasuredRun:
+def _read(files: tuple[tuple[Path, int], ...], _run_changed_ns: tuple[int, ...]) -> MeasuredRun:
     """Once per change of the files, of the run around, or of its conditions."""
     paths = [path for path, _ in files]
     stored = [read_in_place(path) for path in paths]
-    with RunReader(paths[0].parents[2]) as run:
-        together = told_together(run, _calibration(stored[0], calibrations), stored, paths)
     return MeasuredRun(
         shots=tuple(map(_told, stored)),
         statistics=droplet_statistics(stored),
         velocity=velocity_statistics(stored),
-        together=together,
+        together=told_together(stored, paths),
     )
-
-
-def _calibration(stored: StoredDroplets, calibrations: CalibrationStore) -> Calibration | None:
-    """That by which droplets were measured; None where it is gone, or another one has its name."""
-    try:
-        path = calibrations.path(Path(str(stored.provenance.get("calibration_file", ""))).stem)
-        same = file_sha256(path) == stored.provenance.get("calibration_sha256")
-        return load_calibration(path) if same else None
-    except (NotFound, CalibrationError, OSError):
-        return None
 
 
 def _told(stored: StoredDroplets) -> ShotOfDroplets:

@@ -8,14 +8,14 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from daq.files.run_directory import RunReader, ShotFileError
+from daq.files.run_directory import ShotFileError
 from daq.frozen_model import FrozenModel
 from daq.run_plan import ImageKey
 from processing.analysis.droplets.droplet_file import DropletFileError
-from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
+from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics
 from processing.runs.droplets.measured_shot import droplets_path
 from processing.runs.liquid.objects import LiquidSummary, liquid_summary
-from processing.runs.sprays.measured_spray import read_files
+from processing.runs.sprays.measured_spray import read_files, told_spray
 from server.lab.droplets.measured import run_changed_ns
 from server.lab.errors import Damaged, NotFound
 from server.lab.results import droplet_summaries, result_sets
@@ -86,7 +86,7 @@ def spray_so_far(
     """
     run_dir, sample = runs.directory(run_id), measured_sample(runs, run_id, results)
     try:
-        later = (len(RunReader(run_dir).notes_changes), run_changed_ns(run_dir / "results" / sample.results))
+        later = run_changed_ns(run_dir / "results" / sample.results)
         files = tuple((file, file.stat().st_mtime_ns) for file in sample.files)
         statistics, liquid, changes = _of(files, liquid_kg_m3, later)
     except (DropletFileError, ShotFileError, OSError) as error:
@@ -124,9 +124,9 @@ def measured_sample(runs: RunStore, run_id: str, results: str | None) -> Measure
 
 @lru_cache(maxsize=16)
 def _of(
-    files: tuple[tuple[Path, int], ...], liquid_kg_m3: float | None, _changes: tuple[int, int]
+    files: tuple[tuple[Path, int], ...], liquid_kg_m3: float | None, _changes: tuple[int, ...]
 ) -> tuple[SprayStatistics, LiquidSummary, tuple[str, ...]]:
     """Once per change of the files, of the conditions of the run, or of the run itself."""
     spray = read_files([file for file, _ in files])
-    statistics = spray_statistics(spray.shots, AskedFor(spray.axis, liquid_kg_m3=liquid_kg_m3))
+    statistics = told_spray(spray, AskedFor(spray.axis, liquid_kg_m3=liquid_kg_m3))
     return statistics, liquid_summary(spray.shots), spray.changes

@@ -1,5 +1,6 @@
 """``tomoshadow measure``: droplets of a run in files, and bad input that gets one clear sentence."""
 
+import html
 import json
 import re
 import sys
@@ -86,6 +87,21 @@ def test_droplets_of_a_run_lie_in_files_where_they_are(
     assert result["statistics"]["n"] == shot["droplets"]
     assert result["statistics"]["d32_um"] is None
     assert "bright particles have no diameter" in result["statistics"]["reason"]
+
+
+def test_statistics_and_report_tell_once_what_nothing_checks_of_the_shots(
+    bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of two shots, wherever their files lie, with run and calibration out of reach."""
+    measured = told(capsys, *command(bright, tmp_path / "out", run="single"))
+    pooled = told(capsys, "statistics", tmp_path / "out")
+    assert len(measured["not_checked"]) == 5
+    assert [one for one in pooled["not_checked"] if one in measured["not_checked"]] == measured["not_checked"]
+    text = shown(capsys, "statistics", tmp_path / "out")
+    told(capsys, "report", tmp_path / "out", "-o", tmp_path / "report.html")
+    page = html.unescape((tmp_path / "report.html").read_text())
+    for one in measured["not_checked"]:
+        assert (text.count(one["what"]), page.count(one["what"])) == (1, 1)
 
 
 def test_a_file_says_where_it_comes_from_and_what_each_column_is(

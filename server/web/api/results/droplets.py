@@ -14,7 +14,7 @@ router = APIRouter(prefix="/api/runs/{run_id}/results/{results_id}/droplets", ta
 @router.get("", responses=responses(404, 500))
 def show_droplets(run_id: RunId, results_id: ResultsId, context: ContextOf) -> MeasuredRun:
     """Verdicts shot by shot, the statistics of the spray with their intervals, and what nothing checks."""
-    return measured_run(context.runs.directory(run_id) / "results" / results_id, context.calibrations)
+    return measured_run(context.runs.directory(run_id) / "results" / results_id)
 
 
 @router.get("/{shot}.h5", response_class=FileResponse, responses=responses(404))

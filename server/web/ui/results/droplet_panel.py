@@ -55,7 +55,7 @@ class DropletPanel:
     def _row(self, run_id: str, results_id: str) -> dict[str, Any]:
         try:
             results_dir = self._context.runs.directory(run_id) / "results" / results_id
-            run = measured_run(results_dir, self._context.calibrations)
+            run = measured_run(results_dir)
         except ServerError as error:
             return {"id": results_id, "results": results_id, "verdict": str(error)}
         return {"id": results_id, "results": results_id, **droplet_row(run)}

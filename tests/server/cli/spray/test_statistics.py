@@ -113,6 +113,7 @@ def test_a_comparison_finds_what_differs_and_says_what_was_measured_differently(
     differing = {(one["first"], one["second"]) for one in compared["differences"] if one["significant"]}
     assert differing == {("monday", "tuesday"), ("again", "tuesday")}
     text = shown(capsys, "statistics", results / "monday", results / "tuesday", "--compare")
+    assert text.count("whether all views still look where they did at the target") == 1
     compared_by_name = [line for line in text.splitlines() if line.startswith("tuesday / monday")]
     assert any("number density [1/mm³]" in line and "differs" in line for line in compared_by_name)
     assert text.strip().endswith("(Holm): below 0.05 a figure differs")

@@ -20,7 +20,6 @@ from processing.calibration.calibration_record import content_id
 from processing.runs.droplets.measure_settings import MeasureSettings
 from processing.runs.errors import Stopped
 from processing.runs.sprays.measured_spray import read_spray
-from server.lab.calibrations import CalibrationStore
 from server.lab.droplets.measured import measured_run
 from server.lab.droplets.measurement import settings_within
 from server.lab.errors import Unprocessable
@@ -218,9 +217,22 @@ def test_droplets_that_are_not_those_that_were_measured_are_refused(
         read_spray([results])
 
 
+def test_droplets_are_told_although_the_run_around_them_cannot_be_read(measured: Serving) -> None:
+    """They lie in files of their own, which are sound."""
+    run_file, (address, _) = measured.services.data_dir / "bright" / "run.h5", results_of(measured)
+    sound = measured.http.get(address).json()["together"]
+    run_file.write_bytes(b"no HDF5")
+    answer = measured.http.get(address)
+    assert answer.status_code == 200, answer.text
+    assert [shot["verdict"] for shot in answer.json()["shots"]] == ["good", "good"]
+    (changed,) = (together := answer.json()["together"]).pop("conditions_changed")
+    assert re.match(rf"whether run bright was changed later is not known: {run_file}: cannot be read", changed)
+    assert (together, sound.pop("conditions_changed")) == (sound, [])
+
+
 def test_the_page_tells_numbers_with_intervals_and_reasons(measured: Serving) -> None:
     results_dir = next(measured.services.data_dir.glob("bright/results/droplets-*"))
-    row = droplet_row(measured_run(results_dir, CalibrationStore(measured.services.data_dir / "calibrations")))
+    row = droplet_row(measured_run(results_dir))
     assert row["droplets"].endswith("in 2 exposures of shots 0 to 1")
     assert [told_shots(shots) for shots in ([0, 1, 2], [4, 0, 2])] == ["shots 0 to 2", "3 shots from 0 to 4"]
     assert re.fullmatch(r"2\d(\.\d)? \(2\d(\.\d)? to 3\d(\.\d)?\)", row["density"])

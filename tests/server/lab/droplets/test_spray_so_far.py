@@ -8,7 +8,6 @@ import pytest
 from daq.run.events import RunStatus
 from daq.run.state import RunState
 from processing.runs.liquid.objects import NO_OBJECTS
-from server.lab.calibrations import CalibrationStore
 from server.lab.droplets.measured import measured_run
 from server.lab.droplets.proposed_separation import proposed_separation
 from server.lab.droplets.spray_so_far import MOST_SHOTS, spray_so_far
@@ -46,13 +45,13 @@ def test_a_run_that_was_exchanged_is_told_although_its_droplets_are_what_they_we
     (results_dir / "settings.json").write_text("{}")
     runs = RunStore(tmp_path, lambda: RunStatus(state=RunState.IDLE))
     assert spray_so_far(runs, "spray").measured == 3
-    assert len(measured_run(results_dir, CalibrationStore(tmp_path / "calibrations")).shots) == 3
+    assert len(measured_run(results_dir).shots) == 3
     other = write_run(tmp_path / "elsewhere" / "other", shots=3)
     (other / "run.h5").replace(run_dir / "run.h5")
     with pytest.raises(Damaged, match="holds droplets of run spray and lies in run other"):
         spray_so_far(runs, "spray")
     with pytest.raises(Damaged, match="holds droplets of run spray and lies in run other"):
-        measured_run(results_dir, CalibrationStore(tmp_path / "calibrations"))
+        measured_run(results_dir)
 
 
 def test_what_shots_say_together_and_nothing_checks_is_told_on_the_page(tmp_path: Path) -> None:
@@ -62,7 +61,7 @@ def test_what_shots_say_together_and_nothing_checks_is_told_on_the_page(tmp_path
     copies = [replace(shot, provenance={**shot.provenance, "shot": number}) for number in (0, 1)]
     results_dir = write_results(run_dir / "results" / "droplets-1", copies, run="spray")
     (results_dir / "settings.json").write_text("{}")
-    told = measured_run(results_dir, CalibrationStore(tmp_path / "calibrations"))
+    told = measured_run(results_dir)
     assert any("has the very droplets of" in doubt for doubt in told.doubts)
     row = droplet_row(told)
     assert "has the very droplets of" in row["verdict"]
@@ -77,7 +76,7 @@ def test_droplets_of_another_run_of_the_same_name_are_told(tmp_path: Path) -> No
     results_dir = write_results(run_dir / "results" / "droplets-1", cone_shots(0, 3, 40), **of)
     (results_dir / "settings.json").write_text("{}")
     with pytest.raises(Damaged, match=r"run spray that began at 2026-01-01T.* another one, which began at 2026-01-02T"):
-        measured_run(results_dir, CalibrationStore(tmp_path / "calibrations"))
+        measured_run(results_dir)
 
 
 def test_a_separation_is_proposed_within_what_the_cameras_of_the_rig_accept(tmp_path: Path) -> None:
