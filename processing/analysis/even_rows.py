@@ -6,11 +6,10 @@ So nothing tells whether they fly by a spacing more or less from one exposure to
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
-from processing.analysis.lingering_droplets import ALIKE, AXES, SIZES
+from processing.analysis.lingering_droplets import ALIKE, seen_in_a
 from processing.geometry import FloatArray
 
 FEWEST, MOST = 8, 60
@@ -25,18 +24,14 @@ MOST_SHOTS = 5
 def row_spacing_mm(shots: Sequence[StoredDroplets]) -> float | None:
     """Distance in mm by which droplets of exposure A stand apart in even rows; None where most do not."""
     asked = [shot for shot in shots if np.count_nonzero(shot.columns["frame"] == "a") >= FEWEST]
-    spacings_mm = [_spacing_mm(*_seen(shot)) for shot in asked[:MOST_SHOTS]]
+    spacings_mm = [_spacing_mm(*_in_the_middle(*seen_in_a(shot))) for shot in asked[:MOST_SHOTS]]
     known = [one for one in spacings_mm if one is not None]
     return float(np.median(known)) if 2 * len(known) > len(spacings_mm) else None
 
 
-def _seen(shot: StoredDroplets) -> tuple[FloatArray, FloatArray]:
-    """Places in mm, and logarithms of sizes, of the droplets in the middle of exposure A."""
-    of_a: NDArray[np.bool_] = shot.columns["frame"] == "a"
-    places_mm = np.column_stack([np.asarray(shot.columns[name], np.float64)[of_a] for name in AXES])
-    size = next((shot.columns[name] for name in SIZES if name in shot.columns), np.ones(len(of_a)))
+def _in_the_middle(places_mm: FloatArray, log_sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
     middle = np.argsort(np.linalg.norm(places_mm - np.median(places_mm, axis=0), axis=1), kind="stable")[:MOST]
-    return places_mm[middle], np.log(np.asarray(size, np.float64)[of_a][middle])
+    return places_mm[middle], log_sizes[middle]
 
 
 def _spacing_mm(places_mm: FloatArray, log_sizes: FloatArray) -> float | None:

@@ -44,7 +44,7 @@ def _smallest(shots: Sequence[StoredDroplets]) -> str:
 
 def found_from(shot: StoredDroplets) -> float:
     """Diameter in um, or amplitude, from which on droplets of its exposure A are found; 0: its file does not tell."""
-    views = stored_json(shot.provenance, "exposures").get("a", {}).get("views", {})
+    views = shot.exposures.get("a", {}).get("views", {})
     name = "complete_from_um" if DIAMETER in shot.columns else "complete_from"
     return complete_from([view.get(name, 0.0) for view in views.values()])
 
@@ -52,7 +52,7 @@ def found_from(shot: StoredDroplets) -> float:
 def _views(shots: Sequence[StoredDroplets]) -> list[Elongation]:
     """How long shadows are, by view, of all exposures that are not refused; files of older programs do not tell."""
     told = defaultdict(list)
-    exposures = (one for shot in shots for one in stored_json(shot.provenance, "exposures").values())
+    exposures = (one for shot in shots for one in shot.exposures.values())
     for exposure in (one for one in exposures if one.get("verdict") != REFUSED):
         for name, view in exposure.get("views", {}).items():
             if longer := view.get("elongation"):

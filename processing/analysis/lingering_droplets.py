@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.droplet_table import sizes_of
 from processing.geometry import FloatArray
 
 ALIKE = 0.1
@@ -25,7 +26,6 @@ share of the droplets that go a common way where shots are said to show the same
 LARGEST_RADIUS = 0.05
 """Of a common way, over the extent of the droplets: where they are few, hardly another one is near."""
 AXES = ("x_mm", "y_mm", "z_mm")
-SIZES = ("diameter_um", "amplitude")
 
 Seen = tuple[FloatArray, FloatArray]
 """Droplets of exposure A of a shot: places in mm, (N, 3), and logarithms of their sizes, (N,)."""
@@ -56,7 +56,7 @@ def _successive(shots: Sequence[StoredDroplets]) -> list[tuple[Seen, Seen]]:
             runs[shot.provenance.get("run")].append(shot)
     pairs: list[tuple[Seen, Seen]] = []
     for run in runs.values():
-        seen = [_seen(shot) for shot in sorted(run, key=lambda shot: float(shot.provenance.get("shot", 0)))]
+        seen = [seen_in_a(shot) for shot in sorted(run, key=lambda shot: float(shot.provenance.get("shot", 0)))]
         pairs += [
             (one, other)
             for one, other in pairwise(seen)
@@ -65,11 +65,11 @@ def _successive(shots: Sequence[StoredDroplets]) -> list[tuple[Seen, Seen]]:
     return [pairs[one] for one in _evenly(len(pairs), MOST_PAIRS)]
 
 
-def _seen(shot: StoredDroplets) -> Seen:
+def seen_in_a(shot: StoredDroplets) -> Seen:
+    """Droplets of exposure A of a shot."""
     of_a = shot.columns["frame"] == "a"
     places_mm = np.column_stack([np.asarray(shot.columns[name], np.float64)[of_a] for name in AXES])
-    size = next((shot.columns[name] for name in SIZES if name in shot.columns), np.ones(len(of_a)))
-    return places_mm, np.log(np.asarray(size, np.float64)[of_a])
+    return places_mm, np.log(sizes_of(shot.columns)[of_a])
 
 
 def _evenly(count: int, most: int) -> NDArray[np.intp]:

@@ -26,7 +26,7 @@ UNSURE = {"doubtful": "are doubtful, and count", "refused": "are refused, and do
 
 def exposure_doubts(shots: Sequence[StoredDroplets], frames: str = "ab") -> tuple[str, ...]:
     """Doubts on the exposures of some frames."""
-    told = [stored_json(shot.provenance, "exposures") for shot in shots]
+    told = [shot.exposures for shot in shots]
     exposures = [exposure for shot in told for frame, exposure in shot.items() if frame in frames]
     unsure = tuple(_unsure(exposures, "exposure"))
     numbers = unlike_numbers_of_shots(shots) if set(frames) >= {"a", "b"} else ""

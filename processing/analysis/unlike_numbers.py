@@ -11,8 +11,7 @@ import numpy as np
 from scipy.special import bdtr, pdtr, pdtrc
 
 from processing.analysis.droplets.droplet_file import FRAME, StoredDroplets
-from processing.analysis.droplets.droplet_statistics import REFUSED
-from processing.analysis.stored_json import stored_json
+from processing.analysis.droplets.droplet_statistics import told_exposures
 
 MOST_RATIO, MOST_RATIO_OF_SHOTS = 1.5, 1.1
 """Of the larger number to the smaller one, of one shot, and of all shots together."""
@@ -47,8 +46,7 @@ def unlike_numbers_of_shots(shots: Sequence[StoredDroplets]) -> str:
     numbers = [
         int(np.count_nonzero(shot.columns[FRAME].astype("U1") == frame))
         for shot in shots
-        for told in [stored_json(shot.provenance, "exposures")]
-        if {"a", "b"} <= told.keys() and all(one.get("verdict") != REFUSED for one in told.values())
+        if {"a", "b"} <= shot.exposures.keys() and len(told_exposures(shot)) == len(shot.exposures)
         for frame in "ab"
     ]
     told = unlike_numbers(sum(numbers[::2]), sum(numbers[1::2]), MOST_RATIO_OF_SHOTS)
@@ -60,7 +58,7 @@ def unlike_shots(shots: Sequence[StoredDroplets]) -> str:
 
     Those that are refused do not count.
     """
-    told = [(shot, _counted_exposures(shot)) for shot in shots]
+    told = [(shot, len(told_exposures(shot))) for shot in shots]
     counts = [(shot.name, round(len(shot.columns[FRAME]) / exposures)) for shot, exposures in told if exposures]
     odd = [place for place in range(len(counts)) if _is_odd(*_beside([count for _, count in counts], place))]
     if not odd:
@@ -72,11 +70,6 @@ def unlike_shots(shots: Sequence[StoredDroplets]) -> str:
         f"({name}: {count}, a median one of the others: {median:g}): does the light flash in all of them, and does "
         "the spray last? Means over them are of no one spray, and intervals hardly know it"
     )
-
-
-def _counted_exposures(shot: StoredDroplets) -> int:
-    exposures = stored_json(shot.provenance, "exposures").values()
-    return sum(one.get("verdict") != REFUSED for one in exposures)
 
 
 def _beside(counts: Sequence[int], place: int) -> tuple[int, float]:

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DIAMETER, droplet_statistics
+from processing.analysis.droplets.droplet_table import sizes_of
 from processing.analysis.droplets.size_statistics import TOO_FEW, SizeClass, size_classes
 from processing.analysis.estimates import Estimate
 from processing.figures.colours import FRAME_COLOURS
@@ -70,7 +71,7 @@ def droplets_in_space_figure(droplets: StoredDroplets, title: str = "") -> Figur
     """
     columns = droplets.columns
     by = DIAMETER if DIAMETER in columns else "amplitude"
-    sizes = np.asarray(columns[by], np.float64)
+    sizes = sizes_of(columns)
     areas = SMALLEST_PT2 + (LARGEST_PT2 - SMALLEST_PT2) * (sizes / sizes.max(initial=1e-300)) ** 2
     figure = Figure(figsize=(8, 7), layout="constrained")
     axes = figure.add_subplot(projection="3d")

@@ -22,7 +22,6 @@ from processing.runs.unchecked_images import (
     MOVED,
     below,
     even_rows,
-    stated_separation,
     unchecked_images,
     unknown_height,
     unlike_motions,
@@ -75,11 +74,11 @@ def _unchecked(shots: Sequence[StoredDroplets], directed: bool) -> Iterator[Unch
         polarity,
         sizes_known=sizes_known,
         undirected=not directed and any(map(_is_double, shots)),
+        stated_ns=_stated_ns(velocities),
         unscaled=not sizes_known and not all(one.lengths for one in known),
         shallow=not all(one.depth for one in known),
         sparse=not depth_known(sights) and not depth_reversed(sights),
     )
-    yield from map(stated_separation, _stated_ns(velocities))
     yield from below(polarity, [found_from(shot) for shot in shots])
     yield from even_rows(row_spacing_mm(shots)) if any(one["pairs"] for one in velocities) else ()
     yield from unlike_motions([share for one in velocities if (share := _share_alone(one)) is not None])
@@ -93,7 +92,7 @@ def _polarity(shot: StoredDroplets) -> Polarity:
 
 
 def _is_double(shot: StoredDroplets) -> bool:
-    return len(stored_json(shot.provenance, "exposures")) > 1
+    return len(shot.exposures) > 1
 
 
 def _velocities(shots: Sequence[StoredDroplets]) -> list[dict[str, Any]]:

@@ -147,7 +147,7 @@ def stated_scale(um_per_px: float) -> Unchecked:
     )
 
 
-def stated_separation(separation_ns: float) -> Unchecked:
+def _stated_separation(separation_ns: float) -> Unchecked:
     """Of double exposures whose pulses nobody recorded."""
     return Unchecked(
         f"whether exposure B comes {separation_ns:g} ns after A, as the run states: all velocities are in proportion, "
@@ -229,6 +229,7 @@ def unchecked_images(
     single: bool = False,
     um_per_px: float | None = None,
     undirected: bool = False,
+    stated_ns: Iterable[float] = (),
     unscaled: bool = False,
     shallow: bool = False,
     sparse: bool = False,
@@ -247,6 +248,8 @@ def unchecked_images(
         Width of a pixel of it, where that was stated and no magnification tells it.
     undirected : bool
         They are double exposures, and nobody said where the liquid comes from.
+    stated_ns : iterable of float
+        Separations of double exposures that were stated, and no pulse tells them.
     unscaled : bool
         Nobody recorded their magnification, nor compared diameters.
     shallow : bool
@@ -265,6 +268,7 @@ def unchecked_images(
         yield stated_scale(um_per_px)
     if undirected:
         yield ORDER
+    yield from map(_stated_separation, stated_ns)
     if unscaled:
         yield LENGTHS
     if shallow:

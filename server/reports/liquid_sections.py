@@ -12,7 +12,6 @@ from processing.analysis.objects.connected_share import BreakUp, break_up_of, co
 from processing.analysis.objects.liquid_objects import LiquidObjects, ObjectClass
 from processing.analysis.objects.object_sizes import MedianSizes, median_sizes
 from processing.analysis.objects.seeing_views import UnseenMap
-from processing.analysis.stored_json import stored_json
 from processing.figures.object_figures import BreakUpCurve, break_up_figure, unseen_figure
 from processing.geometry import FloatArray
 from processing.runs.liquid.objects import objects_of, reaches_of, told_of_exposures
@@ -175,7 +174,7 @@ def unknown_section(shots: Sequence[StoredDroplets]) -> Section | None:
 
 def _unknown_rows(shots: Sequence[StoredDroplets]) -> list[list[str]]:
     told = [one for shot in shots for one in told_of_exposures(shot)]
-    exposures = [one for shot in shots for one in stored_json(shot.provenance, "exposures").values()]
+    exposures = [one for shot in shots for one in shot.exposures.values()]
     hidden = [one["hidden"]["volume_share"] for one in exposures if one.get("hidden")]
     return [
         _shares("seen by fewer than three views, of what all have in common", [one["unjudged_share"] for one in told]),

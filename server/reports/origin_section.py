@@ -59,7 +59,7 @@ def _said(spray: MeasuredSpray, name: str) -> str:
 
 
 def _views(spray: MeasuredSpray) -> str:
-    exposures = [one for told in map(json.loads, _stated(spray, "exposures")) for one in told.values()]
+    exposures = [one for shot in spray.shots for one in shot.exposures.values()]
     return ", ".join(dict.fromkeys(name for exposure in exposures for name in exposure.get("views", {})))
 
 

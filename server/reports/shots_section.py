@@ -1,7 +1,6 @@
 """The chapter on the shots: exposure by exposure how well it was explained, how many droplets are ghosts, and why."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -9,7 +8,6 @@ from processing.analysis.droplets.droplet_file import DIAMETER, FRAME, StoredDro
 from processing.analysis.droplets.droplet_statistics import P_REAL
 from processing.analysis.droplets.ghost_share import told_share
 from processing.analysis.estimates import Estimate
-from processing.analysis.stored_json import stored_json
 from processing.figures.shots_figure import JudgedExposure, shots_figure
 from server.reports.page import Picture, Section, Table
 
@@ -34,16 +32,11 @@ def shots_section(shots: Sequence[StoredDroplets]) -> Section:
 
 def exposure_rows(shots: Sequence[StoredDroplets]) -> list[list[str]]:
     """A row for each exposure."""
-    return [row for shot in shots for row in _rows(shot.provenance)]
-
-
-def _told(shot: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    told: dict[str, Mapping[str, Any]] = stored_json(shot, "exposures")
-    return told
+    return [row for shot in shots for row in _rows(shot)]
 
 
 def _judged(shot: StoredDroplets) -> Iterator[JudgedExposure]:
-    for frame, one in _told(shot.provenance).items():
+    for frame, one in shot.exposures.items():
         yield JudgedExposure(one["verdict"], one.get("residual_over_noise"), _ghosts(shot, frame))
 
 
@@ -55,16 +48,16 @@ def _ghosts(shot: StoredDroplets, frame: str) -> Estimate | None:
     return share if isinstance(share, Estimate) else None
 
 
-def _rows(said: Mapping[str, Any]) -> list[list[str]]:
+def _rows(shot: StoredDroplets) -> list[list[str]]:
     return [
         [
-            str(said.get("run", "")),
-            str(said.get("shot", "")),
+            str(shot.provenance.get("run", "")),
+            str(shot.provenance.get("shot", "")),
             frame.upper(),
             "" if one.get("residual_over_noise") is None else f"{one['residual_over_noise']:.2f}",
             f"{100 * one.get('hidden', {}).get('volume_share', 0):.1f}",
             one["verdict"],
             "; ".join(one.get("reasons", ())),
         ]
-        for frame, one in _told(said).items()
+        for frame, one in shot.exposures.items()
     ]

@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Protocol
+from typing import Any, Protocol
 
 import h5py
 import numpy as np
@@ -14,6 +15,7 @@ from daq.files.atomic_file import own_part_path, replacing
 from processing.analysis.droplets.droplet_table import P_REAL_TRIED, Columns, DropletRows
 from processing.analysis.droplets.stored_texts import fault_of
 from processing.analysis.seal import SEAL, Table, seal_of
+from processing.analysis.stored_json import stored_json
 from processing.errors import BadInput
 
 SCHEMA, SCHEMA_VERSION = "tomoshadow/droplets", 3
@@ -70,6 +72,12 @@ class StoredDroplets:
     columns: dict[str, NDArray[np.generic]]
     provenance: dict[str, Value]
     objects: dict[str, NDArray[np.generic]] = field(default_factory=dict)
+
+    @cached_property
+    def exposures(self) -> Mapping[str, Mapping[str, Any]]:
+        """What was told of each exposure, by its name; empty where the file does not say."""
+        told: Mapping[str, Mapping[str, Any]] = stored_json(self.provenance, "exposures")
+        return told
 
     @property
     def name(self) -> str:

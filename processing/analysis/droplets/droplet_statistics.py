@@ -134,7 +134,7 @@ def told_exposures(shot: StoredDroplets) -> list[Mapping[str, Any]]:
     """What was told of the exposures that are not refused."""
     if "exposures" not in shot.provenance:
         raise DropletFileError(f"{shot.name}: its file does not say what became of its exposures")
-    exposures = stored_json(shot.provenance, "exposures").values()
+    exposures = shot.exposures.values()
     return [exposure for exposure in exposures if exposure["verdict"] != REFUSED]
 
 
@@ -204,7 +204,7 @@ def _ghost_share(shots: Sequence[StoredDroplets], per_shot: float) -> Estimate |
 
 def _beside_liquid(shot: StoredDroplets) -> bool:
     """Whether that is why nothing says how probably the droplets of any exposure are real."""
-    exposures = stored_json(shot.provenance, "exposures")
+    exposures = shot.exposures
     return all(
         exposure["verdict"] == GOOD
         and exposure.get("hidden", {}).get("liquid_objects", 0)

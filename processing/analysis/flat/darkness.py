@@ -44,6 +44,8 @@ FEWEST_EDGES, LEAST_BETWEEN, LARGEST_SPOT = 50, 0.1, 0.02
 0.36 or more of sharp discs, 0.2 once contrast was doubled, 0 to 0.07 of two grey values through JPEG or with noise; and
 share of the image of the largest spot that is asked: masks and needles have edges of their own."""
 
+THRESHOLD_SET = "whoever set the threshold has set all sizes; give the image as the camera has it"
+
 
 class LightError(BadInput):
     """There is no light that droplets stand out of, or it is not known; the text says what to do."""
@@ -121,10 +123,7 @@ def darkness_of(
 def _require_unprocessed(grey: Image) -> None:
     """Refuse what is left of an image once a threshold was set: edges lie where it says, and nobody knows it."""
     if np.all((grey == grey.min()) | (grey == grey.max())) and grey.min() < grey.max():
-        raise LightError(
-            "has 2 grey values: whoever set the threshold between them has set all sizes; give the image as the camera "
-            "has it"
-        )
+        raise LightError(f"has 2 grey values: {THRESHOLD_SET}")
 
 
 def _require_edges(values: Image) -> None:
@@ -138,8 +137,7 @@ def _require_edges(values: Image) -> None:
     if edges >= FEWEST_EDGES and between < LEAST_BETWEEN * edges:
         raise LightError(
             f"has spots of two grey values: {100 * between / edges:.0f} % of their edges, limit "
-            f"{100 * LEAST_BETWEEN:.0f} %, are between dark and light; whoever set the threshold has set all sizes; "
-            "give the image as the camera has it"
+            f"{100 * LEAST_BETWEEN:.0f} %, are between dark and light; {THRESHOLD_SET}"
         )
 
 

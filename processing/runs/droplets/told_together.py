@@ -14,15 +14,13 @@ from processing.analysis.near_or_far import depth_doubts
 from processing.calibration.verdict import Unchecked
 from processing.reconstruction.settings import FrozenValue
 from processing.runs.not_checked import not_checked
-from processing.runs.sprays.conditions import axis_of, changes_told
+from processing.runs.sprays.conditions import ConditionsChanged, axis_of, changes_told
 
 
 class ToldTogether(FrozenValue):
     """What casts doubt on all shots of a run together, and what nothing checks."""
 
-    conditions_changed: Annotated[
-        tuple[str, ...], Field(description="what of notes, nozzle and axis was changed after the run: by whom and when")
-    ] = ()
+    conditions_changed: ConditionsChanged = ()
     copies: Annotated[tuple[str, ...], Field(description="shots that are the same images")] = ()
     same_droplets: Annotated[tuple[str, ...], Field(description="shots that show the same droplets, not new ones")] = ()
     depth: Annotated[tuple[str, ...], Field(description="whether near and far are exchanged")] = ()

@@ -17,7 +17,6 @@ from processing.analysis.objects.object_search import ObjectSearch, measure_obje
 from processing.analysis.objects.object_sizes import MedianSizes, median_sizes
 from processing.analysis.objects.object_velocities import MovingObjects, object_velocities
 from processing.analysis.objects.told_droplets import without_told
-from processing.analysis.stored_json import stored_json
 from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
@@ -198,7 +197,7 @@ def objects_of(shots: Sequence[StoredDroplets]) -> list[LiquidObjects]:
 
 def _why_none(shots: Sequence[StoredDroplets]) -> str:
     """Why nothing is told of liquid that is no droplet, where nothing is."""
-    exposures = [one for shot in shots for one in stored_json(shot.provenance, "exposures").values()]
+    exposures = [one for shot in shots for one in shot.exposures.values()]
     verdicts = {str(one.get("verdict")) for one in exposures if "objects" not in one}
     told = [text for verdict, text in NOT_MEASURED.items() if verdict in verdicts]
     return " or ".join(told) if told and verdicts <= NOT_MEASURED.keys() else NO_OBJECTS
@@ -234,7 +233,7 @@ def reaches_of(shots: Sequence[StoredDroplets]) -> list[Reach]:
 
 def told_of_exposures(shot: StoredDroplets) -> list[Mapping[str, Any]]:
     """What the file of a shot says of liquid that is no droplet, exposure by exposure."""
-    exposures = stored_json(shot.provenance, "exposures").values()
+    exposures = shot.exposures.values()
     return [exposure["objects"] for exposure in exposures if exposure.get("objects")]
 
 

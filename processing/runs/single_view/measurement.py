@@ -17,7 +17,6 @@ from processing.analysis.flat.flat_doubts import chosen_by_size, crowded, flat_d
 from processing.analysis.flat.flat_droplets import FlatDroplets, measure_flat
 from processing.analysis.flat.flat_settings import FlatSettings
 from processing.analysis.flat.repeated import Discs, counted_twice
-from processing.analysis.stored_json import stored_json
 from processing.errors import BadInput
 from processing.image_file import ImageFileError
 from processing.reconstruction.settings import FrozenValue
@@ -99,7 +98,7 @@ def flat_statistics(shots: Sequence[StoredDroplets]) -> dict[str, Any]:
     """
     unit = "um" if any("diameter_um" in shot.columns for shot in shots) else "px"
     diameters = [np.asarray(shot.columns[f"diameter_{unit}"], np.float64) for shot in shots]
-    exposures = [len(stored_json(shot.provenance, "exposures")) for shot in shots]
+    exposures = [len(shot.exposures) for shot in shots]
     weights = [1 / np.asarray(shot.columns["whole_share"], np.float64) for shot in shots]
     per_shot = sum(exposures) / max(len(exposures), 1)
     sizes = mean_diameters(diameters, exposures_per_shot=per_shot, weights_by_shot=weights)
@@ -111,7 +110,7 @@ def unlike_image_sizes(images: Mapping[str, StoredDroplets]) -> tuple[str, ...]:
     """Why images by name have no common scale: they are not as large."""
     first: dict[tuple[int, int], str] = {}
     for name, image in images.items():
-        for one in stored_json(image.provenance, "exposures").values():
+        for one in image.exposures.values():
             if size_px := one.get("image_size_px"):
                 first.setdefault(tuple(size_px), name)
     if len(first) < 2:
@@ -134,7 +133,7 @@ def doubts_together(shots: Sequence[StoredDroplets], um_per_px: float | None) ->
         Width of a pixel, where columns are in um.
     """
     unit, scale = ("px", 1.0) if um_per_px is None else ("um", um_per_px)
-    told = [one for shot in shots for one in stored_json(shot.provenance, "exposures").values()]
+    told = [one for shot in shots for one in shot.exposures.values()]
     overlapping = sum(int(np.count_nonzero(shot.columns["overlapping"])) for shot in shots)
     clumps = sum(one["left_out"].get("not_round", 0) for one in told)
     sizes_px = (

@@ -3,7 +3,9 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from daq.files.run_directory import NotesChange, RunConditions, RunNotes, RunReader, ShotFileError, Spray
 from processing.analysis.droplets.droplet_file import StoredDroplets
@@ -16,6 +18,9 @@ CHANGED = "conditions_changed"
 REMEDY = "what is told of the spray is of the place that was stated when it was measured: measure it again"
 
 Said = dict[str, Any]
+ConditionsChanged = Annotated[
+    tuple[str, ...], Field(description="what of notes, nozzle and axis was changed after the run: by whom and when")
+]
 
 
 def conditions_of(run: RunReader) -> dict[str, str]:

@@ -12,7 +12,6 @@ from daq.frozen_model import FrozenModel
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics, hidden_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict
-from processing.analysis.stored_json import stored_json
 from processing.analysis.velocity.velocity_statistics import VelocityStatistics, velocity_statistics
 from processing.runs.droplets.measured_shot import droplets_path
 from processing.runs.droplets.told_together import ToldTogether, told_together
@@ -110,7 +109,7 @@ def _read(files: tuple[tuple[Path, int], ...], _run_changed_ns: tuple[int, ...])
 
 
 def _told(stored: StoredDroplets) -> ShotOfDroplets:
-    exposures = stored_json(stored.provenance, "exposures").values()
+    exposures = stored.exposures.values()
     ratios = [ratio for exposure in exposures if (ratio := exposure["residual_over_noise"]) is not None]
     verdicts = [ShotVerdict(exposure["verdict"]) for exposure in exposures]
     return ShotOfDroplets(

@@ -15,6 +15,7 @@ from processing.analysis.droplets.droplet_file import DropletFileError
 from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics
 from processing.runs.droplets.measured_shot import droplets_path
 from processing.runs.liquid.objects import LiquidSummary, liquid_summary
+from processing.runs.sprays.conditions import ConditionsChanged
 from processing.runs.sprays.measured_spray import read_files, told_spray
 from server.lab.droplets.measured import run_changed_ns
 from server.lab.errors import Damaged, NotFound
@@ -34,9 +35,7 @@ class SpraySoFar(FrozenModel):
     recorded: Annotated[int, Field(description="valid sample shots of the run, so far")]
     statistics: Annotated[SprayStatistics, Field(description="of the sample; refused exposures do not count")]
     liquid: Annotated[LiquidSummary, Field(description="ligaments, sheets and break-up of the same shots")]
-    conditions_changed: Annotated[
-        tuple[str, ...], Field(description="what of notes, nozzle and axis was changed after the run: by whom and when")
-    ] = ()
+    conditions_changed: ConditionsChanged = ()
 
 
 @dataclass(frozen=True)

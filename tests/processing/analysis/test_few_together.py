@@ -35,6 +35,7 @@ def shots(
         provenance: dict[str, str | int | float] = {
             "velocity": json.dumps({"separation_ns": separation_ns}),
             "settings": "{}",
+            "exposures": json.dumps({frame: {"verdict": "good"} for frame in "ab"}),
         }
         several.append(StoredDroplets(columns, provenance))
     return several
@@ -52,8 +53,10 @@ def test_few_shadows_of_all_shots_tell_that_they_are_longer_than_wide(along_px2:
     for number, shot in enumerate(several):
         noise_px2 = 0.05 * (-1) ** number
         seen = Elongation(along_px2 + noise_px2, noise_px2, 0.07, 3.0, 0.64, 4)
-        exposure = {"views": {f"view{view}": {"elongation": asdict(seen)} for view in range(1, 5)}}
-        shot.provenance["exposures"] = json.dumps({"a": {"views": {"view1": {"elongation": None}}}, "b": exposure})
+        exposure = {"verdict": "good", "views": {f"view{view}": {"elongation": asdict(seen)} for view in range(1, 5)}}
+        shot.provenance["exposures"] = json.dumps(
+            {"a": {"verdict": "good", "views": {"view1": {"elongation": None}}}, "b": exposure}
+        )
     what = "".join(few_together(several))
     assert told in what
     assert bool(what) is bool(told)

@@ -86,12 +86,11 @@ def judged_by_fainter(shot: MeasuredExposure[Rows, Seen], fainter: int) -> Measu
     together = len(shot.droplets) + fainter
     if fainter - SURE * np.sqrt(fainter) <= MOST_LOST * together:
         return shot
-    reason = (
-        f"about {100 * fainter / together:.0f} % of the droplets, limit {100 * MOST_LOST:.0f} %, are missing: beside "
-        f"those that are told all views see {fainter} spots which are fainter than a tenth of a typical one. Number "
-        "density is too small; or are they copies, by a second flash?"
+    why = (
+        f"beside those that are told all views see {fainter} spots which are fainter than a tenth of a typical one. "
+        "Number density is too small; or are they copies, by a second flash?"
     )
-    return shot.doubted((reason,))
+    return shot.doubted((_missing(fainter / together, why),))
 
 
 def complete_from(limits: Sequence[float]) -> float:
@@ -117,10 +116,11 @@ def cut_off(sizes: FloatArray, limit: float | FloatArray, below: Below = DIAMETE
     least, likely = _lost_to_noise(np.log(shares), below) if below.shares else _lost_shares(np.log(shares))
     if least <= MOST_LOST:
         return ""
-    return (
-        f"about {100 * likely:.0f} % of the droplets, limit {100 * MOST_LOST:.0f} %, are missing: all are found from "
-        + below.harm.format(np.median(limits[known]))
-    )
+    return _missing(likely, f"all are found from {below.harm.format(np.median(limits[known]))}")
+
+
+def _missing(share: float, why: str) -> str:
+    return f"about {100 * share:.0f} % of the droplets, limit {100 * MOST_LOST:.0f} %, are missing: {why}"
 
 
 def _lost_shares(logs: FloatArray) -> tuple[float, float]:
