@@ -5,13 +5,16 @@ spray: an exposure without droplets is a good one of an empty box. Nor does anyt
 light, or of a spray that is there in one of many shots.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import bdtr, pdtr, pdtrc
 
 from processing.analysis.droplets.droplet_file import FRAME, StoredDroplets
-from processing.analysis.droplets.droplet_statistics import told_exposures
+from processing.analysis.droplets.droplet_statistics import hidden_share, measured_mm3, told_exposures
+from processing.geometry import FloatArray
 
 MOST_RATIO, MOST_RATIO_OF_SHOTS = 1.5, 1.1
 """Of the larger number to the smaller one, of one shot, and of all shots together."""
@@ -56,29 +59,48 @@ def unlike_numbers_of_shots(shots: Sequence[StoredDroplets]) -> str:
 def unlike_shots(shots: Sequence[StoredDroplets]) -> str:
     """What is wrong where some shots have far more or fewer droplets than the others; empty where nothing says so.
 
-    Those that are refused do not count.
+    Asked is how many there are where liquid hides none. Shots that are refused, or all hidden, do not count.
     """
-    told = [(shot, len(told_exposures(shot))) for shot in shots]
-    counts = [(shot.name, round(len(shot.columns[FRAME]) / exposures)) for shot, exposures in told if exposures]
-    odd = [place for place in range(len(counts)) if _is_odd(*_beside([count for _, count in counts], place))]
+    told = [(shot, exposures) for shot in shots if (exposures := told_exposures(shot))]
+    parts = _seen_parts(told)
+    seen = [(shot, len(exposures), part) for (shot, exposures), part in zip(told, parts, strict=True) if part]
+    counts = [round(len(shot.columns[FRAME]) / exposures) for shot, exposures, _ in seen]
+    seen_parts = np.array([part / exposures for _, exposures, part in seen])
+    usual, fewest, most = (_by_the_others(many, seen_parts) for many in _within_chance(np.array(counts)))
+    odd = [place for place, count in enumerate(counts) if _is_odd(count, fewest[place], most[place])]
     if not odd:
         return ""
-    name, count = counts[odd[0]]
-    _, median = _beside([one for _, one in counts], odd[0])
+    first = odd[0]
     return (
-        f"{len(odd)} of {len(counts)} shots have {MOST_OF_A_SHOT:g} times more or fewer droplets than the others "
-        f"({name}: {count}, a median one of the others: {median:g}): does the light flash in all of them, and does "
-        "the spray last? Means over them are of no one spray, and intervals hardly know it"
+        f"{len(odd)} of {len(counts)} shots have {MOST_OF_A_SHOT:g} times more or fewer droplets than the others, "
+        f"where liquid hides none ({seen[first][0].name}: {counts[first]}, by a median one of the others: "
+        f"{usual[first]:.3g}): does the light flash in all of them, and does the spray last? Means over them are of "
+        "no one spray, and intervals hardly know it"
     )
 
 
-def _beside(counts: Sequence[int], place: int) -> tuple[int, float]:
-    """Droplets of a shot, and of a median one of the others."""
-    others = [*counts[:place], *counts[place + 1 :]]
-    return counts[place], float(np.median(others)) if others else float(counts[place])
+def _seen_parts(told: Sequence[tuple[StoredDroplets, Sequence[Mapping[str, Any]]]]) -> list[float]:
+    """What could be measured, of all exposures of a shot: mm3, or shares of a volume that some files do not tell."""
+    volumes_mm3 = [one for shot, exposures in told if (one := measured_mm3(shot, exposures)) is not None]
+    if len(volumes_mm3) == len(told):
+        return volumes_mm3
+    return [sum(1 - hidden_share(one) for one in exposures) for _, exposures in told]
 
 
-def _is_odd(count: int, usual: float) -> bool:
-    if count > usual:
-        return count > MOST_OF_A_SHOT * usual and float(pdtrc(count - 1, max(usual, 1.0))) < CHANCE_OF_A_SHOT
-    return MOST_OF_A_SHOT * count < usual and float(pdtr(count, usual)) < CHANCE_OF_A_SHOT
+def _within_chance(counts: NDArray[Any]) -> tuple[NDArray[Any], FloatArray, FloatArray]:
+    """Droplets that are seen of each shot, and fewer and more that chance may well make of as many."""
+    return counts, counts - np.sqrt(counts), np.maximum(counts + np.sqrt(counts), 1.0)
+
+
+def _by_the_others(counts: NDArray[Any], parts: FloatArray) -> list[float]:
+    """Droplets that each shot would have by the median density of the others, if these had so many."""
+    if len(counts) < 2:
+        return list(map(float, counts))
+    others = [np.median(np.delete(counts / parts, place)) for place in range(len(counts))]
+    return [float(one) for one in parts * others]
+
+
+def _is_odd(count: int, fewest: float, most: float) -> bool:
+    """Whether chance hardly makes so many, or so few, where there are these by the others."""
+    many = count > MOST_OF_A_SHOT * most and float(pdtrc(count - 1, most)) < CHANCE_OF_A_SHOT
+    return many or (MOST_OF_A_SHOT * count < fewest and float(pdtr(count, fewest)) < CHANCE_OF_A_SHOT)

@@ -1,6 +1,7 @@
 """Exposures A and B of one shot show the same droplets: where one has far fewer, that is told."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,17 +10,26 @@ from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.shot_doubts import exposure_doubts
 from processing.analysis.spray.spray_doubts import spray_doubts
+from processing.analysis.unlike_numbers import unlike_shots
+from processing.reconstruction.settings import GridSettings
 from processing.runs.droplets.measured_shot import compared
+from processing.volume import VoxelGrid
 from tests.support.measured_exposures import measured
 from tests.support.moving_droplets import exposures
 
 EMPTY = np.arange(0)
+FAR = "have 5 times more or fewer droplets than the others"
 
 
-def shot(first: int, second: int, verdict: str = "good") -> StoredDroplets:
-    told = {"a": {"verdict": "good"}, "b": {"verdict": verdict}}
+def shot(
+    first: int, second: int, verdict: str = "good", *, hidden: float = 0.0, grid: VoxelGrid | None = None
+) -> StoredDroplets:
+    told: dict[str, dict[str, Any]] = {"a": {"verdict": "good"}, "b": {"verdict": verdict}}
+    if hidden:
+        told = {frame: {**one, "hidden": {"volume_share": hidden}} for frame, one in told.items()}
     columns = {"frame": np.repeat(["a", "b"], [first, second]), "amplitude": np.ones(first + second)}
-    return StoredDroplets(columns, {"exposures": json.dumps(told)})
+    box = {"grid": GridSettings.of(grid).model_dump_json()} if grid else {}
+    return StoredDroplets(columns, {"exposures": json.dumps(told), **box})
 
 
 @pytest.mark.parametrize("count", [0, 10])
@@ -75,3 +85,30 @@ def test_gusts_and_few_droplets_are_no_odd_shots() -> None:
             for shots in (2, 3, 6, 12, 40):
                 counts = rng.poisson(mean * np.exp(gusts * rng.standard_normal(shots)))
                 assert spray_doubts([shot(count, count) for count in counts]) == ()
+
+
+def test_a_shot_of_which_liquid_hides_much_has_as_many_as_fit_into_the_rest() -> None:
+    """80 droplets where nothing is hidden are 8 where a tenth is seen; all that is hidden tells nothing."""
+    usual = [shot(80, 78)] * 5
+    assert unlike_shots([*usual, shot(8, 9, hidden=0.9), shot(0, 0, hidden=1.0)]) == ""
+    assert unlike_shots([shot(8, 9, hidden=0.9)] * 5 + [shot(80, 78)]) == ""
+    for odd in (shot(80, 79, hidden=0.9), shot(0, 0, hidden=0.5)):
+        assert f"1 of 6 shots {FAR}" in unlike_shots([*usual, odd])
+
+
+def test_shots_of_a_smaller_box_have_as_many_as_fit_into_it() -> None:
+    usual, smaller = VoxelGrid((40, 40, 40), (0, 0, 0), 0.1), VoxelGrid((40, 40, 4), (0, 0, 0), 0.1)
+    large = [shot(80, 78, grid=usual)] * 5
+    assert unlike_shots([*large, shot(8, 9, grid=smaller)]) == ""
+    assert f"1 of 6 shots {FAR}" in unlike_shots([*large, shot(80, 81, grid=smaller)])
+    assert f"1 of 7 shots {FAR}" in unlike_shots([*large, shot(80, 81), shot(8, 9, grid=smaller)])
+
+
+def test_hidden_shares_of_gusty_sprays_make_no_odd_shots() -> None:
+    rng = np.random.default_rng(1)
+    for mean in (2, 10, 50, 300):
+        for shots in (2, 3, 6, 12, 40):
+            hidden = rng.uniform(0, 0.95, shots)
+            counts = rng.poisson(mean * (1 - hidden) * np.exp(0.3 * rng.standard_normal(shots)))
+            several = [shot(count, count, hidden=share) for count, share in zip(counts, hidden, strict=True)]
+            assert unlike_shots(several) == ""
