@@ -5,7 +5,7 @@ made from it. The first axis of every column is the shot.
 """
 
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +22,8 @@ SHOT_VERSION = 2
 """Of shot files: a column says since which one it is there."""
 PULSE_SLOTS = 4
 """Light pulses per view that a shot can hold; a slot without a pulse has width 0."""
+BITS = "significant_bits"
+"""Attribute of the frames of a view: of a grey value. No checksum holds it, and other programs read by it."""
 NO_SEQUENCE = -1
 """Trigger sequence of a shot that no generator fired."""
 NO_EDGE_NS = -(2**63)
@@ -177,3 +179,14 @@ def _fired_train(columns: Columns, sequence: int, views: Iterable[str]) -> Fired
 def _pulses(columns: Columns, view: str) -> tuple[LightPulse, ...]:
     fields = [columns[view_path(view, f"pulse_{name}")].tolist() for name in _PULSE_COLUMNS]
     return tuple(LightPulse(*values) for values in zip(*fields, strict=True) if values[1])
+
+
+def unlike_bits(file: Any, header: RunHeader) -> Iterator[str]:
+    """Of which views an open file of a run, or of one of its shots, says other bits than the run; for people."""
+    for view, view_format in header.views.items():
+        bits = file[frames_path(view)].attrs.get(BITS, view_format.bits)
+        if bits != view_format.bits:
+            yield (
+                f"{file.filename}: frames of {view} have {bits} significant bits, those of the run {view_format.bits}: "
+                "copy it back from a backup"
+            )

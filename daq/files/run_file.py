@@ -21,7 +21,7 @@ from pydantic import TypeAdapter
 from daq.causes import Cause
 from daq.errors import RecorderError, ShotFileError
 from daq.files.atomic_file import amending, replacing, reserve, spending_reserve
-from daq.files.columns import columns_of, frames_path
+from daq.files.columns import BITS, columns_of, frames_path, unlike_bits
 from daq.files.header import RunClosing, RunHeader
 from daq.files.shot_file import LIBRARY_VERSIONS, SCHEMA_VERSION, create_groups, unreadable
 from daq.files.text_heap import has_whole_heaps
@@ -148,6 +148,7 @@ def other_programs_see(run_dir: Path, header: RunHeader) -> Iterator[str]:
                     f"{file.filename}: {path} is not that of the shots: other programs see something else there; "
                     "copy it back from a backup"
                 )
+        yield from unlike_bits(file, header)
 
 
 def read_later_notes(run_dir: Path) -> str:
@@ -255,7 +256,7 @@ def _write_view(file: h5py.File, header: RunHeader) -> None:
         frames = _create_virtual(
             file, frames_path(view), view_format.dtype, (header.frames_per_shot, *view_format.shape)
         )
-        frames.attrs.update(units="counts", dimensions="shot,frame,row,column", significant_bits=view_format.bits)
+        frames.attrs.update(units="counts", dimensions="shot,frame,row,column", **{BITS: view_format.bits})
     for path, column in columns_of(header).items():
         dataset = _create_virtual(file, path, np.dtype(column.dtype), column.shape)
         dataset.attrs.update(units=column.units, dimensions=column.axes)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from daq.errors import DamagedFrame, DamagedNumbers, ForeignFile, RecorderError, RenamedFile, ShotFileError
 from daq.files.columns import (
+    BITS,
     SHOT_VERSION,
     Column,
     columns_of,
@@ -21,6 +22,7 @@ from daq.files.columns import (
     frames_path,
     shot_from_columns,
     shot_to_columns,
+    unlike_bits,
     view_path,
 )
 from daq.files.encoding import EncodedFrame, decode_frame, encode_frame, is_shuffled
@@ -124,6 +126,8 @@ def read_shot_file(path: Path, header: RunHeader, exposures: Exposures = "ab") -
     """
     with reading_shot(path, header) as file:
         columns = _read_columns(path, file, header)
+        for told in unlike_bits(file, header):
+            raise DamagedNumbers(told)
         frames = {
             view: _read_frames(path, file, view, view_format, columns[crc32_path(view)], exposures)
             for view, view_format in header.views.items()
@@ -178,7 +182,7 @@ def create_frames(
         compression_opts=1,
         shuffle=is_shuffled(view_format.dtype),
     )
-    dataset.attrs.update(stored(units="counts", dimensions="shot,frame,row,column", significant_bits=view_format.bits))
+    dataset.attrs.update(stored(units="counts", dimensions="shot,frame,row,column", **{BITS: view_format.bits}))
     return dataset
 
 
@@ -288,9 +292,7 @@ def read_formats(path: Path) -> tuple[str, dict[str, ViewFormat], int]:
             if _text(file.attrs["schema"]) != SHOT_SCHEMA:
                 raise ForeignFile(f"{path}: not a shot")
             frames = {view: group["frames"] for view, group in file["cameras"].items()}
-            views = {
-                view: ViewFormat(one.shape[2:], int(one.attrs["significant_bits"])) for view, one in frames.items()
-            }
+            views = {view: ViewFormat(one.shape[2:], int(one.attrs[BITS])) for view, one in frames.items()}
             return _text(file.attrs["run_id"]), views, max(one.shape[1] for one in frames.values())
     except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
         raise unreadable(path, error) from error

@@ -3,8 +3,8 @@
 
     python -m tests.hunt [--minutes 10] [--seed 1] [--cases N] [--world KIND] [--distortions NAME+NAME] [--amount 0.5]
 
-Prints a line per case, and at the end a table of what became of them; ``--json FILE`` keeps a line of JSON of each. The
-same seed is the same case. Exit status 1 if anything that is told as good is a lie.
+Prints a line per case, and at the end, or when a signal ends it, a table of what became of them; ``--json FILE`` keeps
+a line of JSON of each. The same seed is the same case. Exit status 1 if anything that is told as good is a lie.
 """
 
 import json
@@ -13,10 +13,12 @@ import time
 from argparse import ArgumentParser, Namespace
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict
 from itertools import count, islice
 from pathlib import Path
 
+from server.cli.output import endable
 from tests.hunt.case import Case, drawn_case
 from tests.hunt.distortions import DISTORTIONS
 from tests.hunt.world import KINDS
@@ -28,12 +30,13 @@ def main(arguments: list[str]) -> int:
     """Hunt, tell; the exit status."""
     options = _options(arguments)
     cases = []
-    for case in _hunted(options):
-        cases.append(case)
-        print(line(case), flush=True)
-        if options.json:
-            with options.json.open("a") as file:
-                file.write(json.dumps(asdict(case)) + "\n")
+    with suppress(KeyboardInterrupt), endable():
+        for case in _hunted(options):
+            cases.append(case)
+            print(line(case), flush=True)
+            if options.json:
+                with options.json.open("a") as file:
+                    file.write(json.dumps(asdict(case)) + "\n")
     print("\n".join(["", *table(cases)]))
     return int(any(case.outcome == "lie" for case in cases))
 

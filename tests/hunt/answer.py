@@ -73,7 +73,10 @@ def _command(*arguments: object) -> tuple[int, dict[str, Any], str]:
     with redirect_stdout(out), redirect_stderr(words):
         status = main([*map(str, arguments), "--json"])
     lines = out.getvalue().splitlines()
-    return status, json.loads(lines[-1]) if lines else {}, words.getvalue()
+    said = json.loads(lines[-1]) if lines else {}
+    if said.get("error") == "interrupted":
+        raise KeyboardInterrupt
+    return status, said, words.getvalue()
 
 
 def _read(file: Path) -> dict[int, Told]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.hunt.__main__ import line, table
+from tests.hunt.__main__ import main as hunt
 from tests.hunt.answer import Answer, Told, asked
 from tests.hunt.case import Case, case_of, drawn_case
 from tests.hunt.distortions import DISTORTIONS
@@ -188,6 +189,17 @@ def test_an_undistorted_world_is_measured_right() -> None:
     case = case_of(replace(drawn("single", 3), stated_light="gaussian"), {}, np.random.default_rng(3))
     assert (case.outcome, case.distortions) == ("right", ())
     assert line(case).startswith("right")
+
+
+def test_a_hunt_that_is_ended_tells_what_it_has_found(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def ended(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("processing.runs.droplets.measurement.RunMeasurement.of", ended)
+    assert hunt(["--cases", "2", "--world", "single", "--distortions", "none"]) == 0
+    assert "0 cases: 0 lies" in capsys.readouterr().out
 
 
 def test_a_wrong_separation_is_wrong_and_named_and_would_else_be_a_lie(tmp_path: Path) -> None:

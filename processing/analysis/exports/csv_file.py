@@ -1,4 +1,7 @@
-"""Droplets or tracks as CSV (RFC 4180): names with units, then a row per droplet; what is no number is empty."""
+"""Droplets or tracks as CSV (RFC 4180): names with units, then a row per droplet; what is no number is empty.
+
+What has no droplet, a whole shot or one of its exposures, has a row without numbers, which tells its verdict.
+"""
 
 import csv
 from pathlib import Path
@@ -7,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.files.atomic_file import replacing
-from processing.analysis.exports.shot_table import shot_table
+from processing.analysis.exports.shot_table import shot_table, told_without_rows
 from processing.analysis.exports.stored import Stored
 
 
@@ -26,6 +29,7 @@ def write_csv(path: Path, stored: Stored) -> None:
         writer = csv.writer(file)
         writer.writerow(table)
         writer.writerows(zip(*map(_cells, table.values()), strict=True))
+        writer.writerows([cells.get(name, "") for name in table] for cells in told_without_rows(stored))
 
 
 def _cells(column: NDArray[np.generic]) -> list[object]:

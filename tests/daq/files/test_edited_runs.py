@@ -86,6 +86,20 @@ def test_numbers_stay_those_of_their_view_and_version(tmp_path: Path, edit: Edit
     assert told == [FlawKind.DAMAGED]
 
 
+def test_bits_of_a_shot_are_those_of_its_run(run_dir: Path) -> None:
+    """Whoever reads a shot without its run takes its grey values by them."""
+    edited(run_dir / "shots" / "1.h5", lambda file: file["cameras/view2/frames"].attrs.modify("significant_bits", 9))
+    flaws = verify(run_dir).flaws
+    assert [(flaw.kind, flaw.file) for flaw in flaws] == [(FlawKind.DAMAGED, "shots/1.h5")]
+    assert "frames of view2 have 9 significant bits" in flaws[0].text
+
+
+def test_a_shot_that_tells_no_bits_is_read(run_dir: Path) -> None:
+    edited(run_dir / "shots" / "0.h5", lambda file: file["cameras/view2/frames"].attrs.pop("significant_bits"))
+    edited(run_dir / "run.h5", lambda file: file["cameras/view2/frames"].attrs.pop("significant_bits"))
+    assert verify(run_dir).sound
+
+
 def test_a_shot_from_before_it_had_a_checksum_of_its_numbers_is_read(run_dir: Path) -> None:
     for index in range(2):
         edited(run_dir / "shots" / f"{index}.h5", lambda file: file.attrs.pop("columns_crc32"))
@@ -125,9 +139,10 @@ def replaced(file: h5py.File) -> None:
     [
         (lambda file: exchange(file, "cameras/view1", "cameras/view2"), "/cameras/view1/"),
         (replaced, "/cameras/view1/pulse_current_a"),
+        (lambda file: file["cameras/view2/frames"].attrs.modify("significant_bits", 9), "view2 have 9 sig"),
         (lambda file: file["entry/start_time"].write_direct(np.array("1999", object)), "start_time"),
     ],
-    ids=["views exchanged", "numbers of its own", "a time of NeXus"],
+    ids=["views exchanged", "numbers of its own", "bits", "a time of NeXus"],
 )
 def test_what_other_programs_see_is_what_the_shots_hold(run_dir: Path, edit: Edit, what: str) -> None:
     edited(run_dir / "run.h5", edit)

@@ -108,6 +108,34 @@ def test_csv_has_every_digit_and_no_nan(file: Path) -> None:
             assert [float(row[name]) for row in rows] == column.tolist(), name
 
 
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as text:
+        return list(csv.DictReader(text))
+
+
+def test_csv_tells_the_verdict_of_an_exposure_that_has_no_droplet(tmp_path: Path, empty: Path) -> None:
+    """In a row without numbers, behind those of droplets."""
+    exposures = {"a": {"verdict": "refused", "reasons": ["no light"]}, "b": {"verdict": "good", "reasons": []}}
+    for seen in (0, 3):
+        path = tmp_path / f"shot_{seen:05d}_droplets.h5"
+        told: dict[str, str | int | float] = {"run": "spray", "shot": seen, "exposures": json.dumps(exposures)}
+        write_droplets(path, {"a": Droplets.none(), "b": droplets(seen, 2)}, told)
+        rows = rows_of(export_droplets(path, "csv"))
+        without = [row for row in rows if not row["x_mm"]]
+        assert rows[seen:] == without
+        expected = [("a", "refused", "no light"), *([] if seen else [("b", "good", "")])]
+        assert [(row["frame"], row["verdict"], row["doubts"]) for row in without] == expected
+        assert {row["shot"] for row in rows} == {str(seen)}
+    assert [(row["shot"], row["verdict"]) for row in rows_of(export_droplets(empty, "csv"))] == [("8", "not told")]
+
+
+def test_csv_of_no_track_tells_its_verdict(tmp_path: Path) -> None:
+    path = tmp_path / "none.h5"
+    columns: dict[str, Any] = {name: np.empty(0) for name in ("track", "shot", "x_mm", "y_mm", "z_mm")}
+    write_tracks(path, DropletTracks(columns, 0, 9, 2000.0, None), {"run": "spray"})
+    assert [(row["x_mm"], row["verdict"]) for row in rows_of(export_tracks(path, "csv"))] == [("", "good")]
+
+
 def test_parquet_keeps_columns_types_and_provenance(file: Path) -> None:
     table = parquet.read_table(export_droplets(file, "parquet"))
     stored = read_droplets(file)
@@ -164,9 +192,7 @@ def test_vtkhdf_is_as_its_specification_has_poly_data(file: Path, empty: Path, n
 
 
 def test_a_shot_without_droplets_is_a_table_without_rows(empty: Path) -> None:
-    text = export_droplets(empty, "csv").read_text().splitlines()
-    assert len(text) == 1
-    assert text[0].startswith("shot,frame,x_mm")
+    assert export_droplets(empty, "csv").read_text().startswith("shot,frame,x_mm")
     schema = parquet.read_table(export_droplets(empty, "parquet")).schema
     assert [str(schema.field(name).type) for name in ("frame", "x_mm")] == ["string", "double"]
 
