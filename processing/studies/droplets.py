@@ -17,7 +17,7 @@ from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, matches
 from processing.figures.droplet_figures import MeasuredCase, droplets_figure
 from processing.geometry import FloatArray, PinholeCamera
 from processing.kernels import DEFAULT_THREADS
-from processing.studies.report import Statement, grouped
+from processing.studies.report import Statement, grouped, shares_asked, shares_told
 from processing.studies.sensitivity import misaligned, spread_cameras
 from processing.studies.simulated_droplets import Image, droplet_centres, study_grid
 from processing.synthetic.bright_particles import spots_image
@@ -261,22 +261,18 @@ def _case(row: DropletRow) -> str:
 def droplet_statements(rows: Sequence[DropletRow]) -> list[Statement]:
     """Mean and worst shot of every case."""
     return [
-        Statement(f"{case}: found/ghosts in %, mean and worst", _asked(chosen[0]), _reached_text(chosen))
+        Statement(
+            f"{case}: found/ghosts in %, mean and worst",
+            shares_asked(chosen[0].least_found, chosen[0].most_ghosts),
+            _reached_text(chosen),
+        )
         for case, chosen in grouped(rows, _case).items()
     ]
 
 
-def _asked(row: DropletRow) -> str:
-    if row.least_found is None or row.most_ghosts is None:
-        return "left open"
-    return f"left open, here asked for {100 * row.least_found:.1f}/{100 * row.most_ghosts:.1f}"
-
-
 def _reached_text(rows: Sequence[DropletRow]) -> str:
-    found, ghosts = ([100 * getattr(row, name) for row in rows] for name in ("found", "ghosts"))
-    mean = f"{np.mean(found):.2f}/{np.mean(ghosts):.2f}, worst {min(found):.2f}/{max(ghosts):.2f}"
     rms_voxel, cpu_ms = (np.mean([getattr(row, name) for row in rows]) for name in ("rms_voxel", "cpu_ms_per_droplet"))
-    return f"{mean}; rms {rms_voxel:.3f} voxel, {cpu_ms:.2f} CPU-ms per droplet"
+    return f"{shares_told(rows)}; rms {rms_voxel:.3f} voxel, {cpu_ms:.2f} CPU-ms per droplet"
 
 
 def droplet_figure(rows: Sequence[DropletRow]) -> Figure:

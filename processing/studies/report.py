@@ -23,6 +23,18 @@ class CaseRow(Protocol):
         """Its name."""
 
 
+class FoundRow(Protocol):
+    """How many droplets of a shot are found, and how many of what is found are ghosts."""
+
+    @property
+    def found(self) -> float:
+        """Share of the true ones."""
+
+    @property
+    def ghosts(self) -> float:
+        """Share of what is told."""
+
+
 Case = TypeVar("Case", bound=NamedCase)
 OfCase = TypeVar("OfCase", bound=CaseRow)
 Row = TypeVar("Row")
@@ -83,6 +95,20 @@ def all_kept(
     judged = [kept(case, its) for case, its in by_case(cases, rows)]
     asked = [one for one in judged if one is not None]
     return all(asked) if asked else None
+
+
+def shares_asked(least_found: float | None, most_ghosts: float | None) -> str:
+    """What the paper says of droplets found and ghosts, and what is asked for here."""
+    if least_found is None or most_ghosts is None:
+        return "left open"
+    return f"left open, here asked for {100 * least_found:.1f}/{100 * most_ghosts:.1f}"
+
+
+def shares_told(rows: Sequence[FoundRow]) -> str:
+    """Found and ghosts in percent, mean and worst shot."""
+    found, ghosts = [100 * row.found for row in rows], [100 * row.ghosts for row in rows]
+    means = f"{sum(found) / len(found):.2f}/{sum(ghosts) / len(ghosts):.2f}"
+    return f"{means}, worst {min(found):.2f}/{max(ghosts):.2f}"
 
 
 def csv_text(rows: Sequence[Any]) -> str:

@@ -19,7 +19,7 @@ from processing.figures.droplet_figures import MeasuredCase, droplets_figure
 from processing.geometry import PinholeCamera
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import IMAGE_SIZE_PX, SLAB
-from processing.studies.report import Statement, all_kept, by_case, case_statements
+from processing.studies.report import Statement, all_kept, by_case, case_statements, shares_asked, shares_told
 from processing.studies.sensitivity import misaligned, spread_cameras
 from processing.studies.shadows.size_errors import d32_of, size_errors
 from processing.studies.simulated_droplets import Image, study_grid
@@ -266,17 +266,13 @@ def size_statements(rows: Sequence[SizeRow], cases: Sequence[SizeCase]) -> list[
 
 
 def _asked(case: SizeCase) -> str:
-    if case.least_found is None or case.most_ghosts is None:
-        return "left open"
-    return f"left open, here asked for {100 * case.least_found:.1f}/{100 * case.most_ghosts:.1f}"
+    return shares_asked(case.least_found, case.most_ghosts)
 
 
 def _told(rows: Sequence[SizeRow]) -> str:
-    found, ghosts = ([100 * getattr(row, name) for row in rows] for name in ("found", "ghosts"))
-    mean = f"{np.mean(found):.2f}/{np.mean(ghosts):.2f}, worst {min(found):.2f}/{max(ghosts):.2f}"
     d32 = max(abs(row.d32_error) for row in rows)
     sd_um, cpu_ms = (np.mean([getattr(row, name) for row in rows]) for name in ("sd_um", "cpu_ms_per_droplet"))
-    return f"{mean}; D +- {sd_um:.2f} um, D32 to {100 * d32:.1f} %, {cpu_ms:.1f} CPU-ms per droplet"
+    return f"{shares_told(rows)}; D +- {sd_um:.2f} um, D32 to {100 * d32:.1f} %, {cpu_ms:.1f} CPU-ms per droplet"
 
 
 def size_figure(rows: Sequence[SizeRow], cases: Sequence[SizeCase]) -> Figure:
