@@ -39,6 +39,9 @@ LEAST_SHARE = 0.5
 """Of the light that was given, which the brightest pixels of an image have: hardly a spray covers all of a view."""
 
 
+MOST_HELD, LEAST_LIT = 0.2, 0.1
+"""Of the light beside droplets: a background that lacks so much where they are holds them (three tenths make discs of
+14 px 2 % too small, half 4 %); and what a background has at least where it is no silhouette, as a nozzle is."""
 FEWEST_EDGES, LEAST_BETWEEN, LARGEST_SPOT = 50, 0.1, 0.02
 """Pixels along edges of dark spots that tell whether a threshold made them; pixels between dark and light beside each:
 0.36 or more of sharp discs, 0.2 once contrast was doubled, 0 to 0.07 of two grey values through JPEG or with noise; and
@@ -160,7 +163,24 @@ def _given(grey: Image, light: Image) -> Image:
         )
     if better := better_background(grey, light):
         raise LightError(f"does not fit its background, but {better}: is that exchanged, or turned?")
+    if (held := _held(grey, light)) > MOST_HELD:
+        raise LightError(
+            f"has a background that is {100 * held:.0f} % darker where droplets are: it holds a part of them, which "
+            "makes them too small; give the light without droplets"
+        )
     return light
+
+
+def _held(grey: Image, light: Image) -> float:
+    """By how much a background is darker at dark spots of an image than beside them; 0 of few pixels, or black ones."""
+    width = max(min(grey.shape) // 8, 3)
+    dark = grey < 0.5 * light
+    free = (~dark).astype(np.float32)
+    beside = cv2.blur(light * free, (width, width)) / np.maximum(cv2.blur(free, (width, width)), 1e-3)
+    lit = dark & (light > LEAST_LIT * beside)
+    if np.count_nonzero(lit) < FEWEST_EDGES:
+        return 0.0
+    return 1 - float(np.median(light[lit] / np.maximum(beside[lit], 1e-6)))
 
 
 def _require_light(grey: Image, saturated: NDArray[np.bool_]) -> None:
