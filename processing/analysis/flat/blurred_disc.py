@@ -42,7 +42,7 @@ def flattening(radius_px: float, blur_px: float) -> float:
     """Mean of the 3 x 3 pixels in the middle of a blurred disc, over its middle: 1 but for small ones."""
     if blur_px <= 0:
         return 1.0
-    middle, beside, corner = _profile(np.array([0.0, 1.0, np.sqrt(2)]), radius_px, blur_px).tolist()
+    middle, beside, corner = profile(np.array([0.0, 1.0, np.sqrt(2)]), radius_px, blur_px).tolist()
     return float((middle + 4 * beside + 4 * corner) / (9 * middle))
 
 
@@ -56,11 +56,11 @@ def _table() -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _outlines(blur: float, radii: FloatArray) -> tuple[float, ...]:
-    profile = _profile(radii, 1.0, blur)
-    profile /= profile[0]
-    return tuple(float(np.interp(-level, -profile, radii)) for level in LEVELS)
+    dark = profile(radii, 1.0, blur)
+    dark /= dark[0]
+    return tuple(float(np.interp(-level, -dark, radii)) for level in LEVELS)
 
 
-def _profile(distances: FloatArray, radius: float, blur: float) -> FloatArray:
+def profile(distances: FloatArray, radius: float, blur: float) -> FloatArray:
     """Darkness of a blurred disc at distances from its centre."""
     return np.asarray(chndtr((radius / blur) ** 2, 2, np.maximum(distances, 1e-9) ** 2 / blur**2))

@@ -15,6 +15,10 @@ LEAST_MEASURED = 0.5
 MOST_LARGER, FEWEST_LACKING = 0.03, 3
 """So much larger than that of all may the mean diameter of those be that are measured; fewer lacking ones are dust."""
 
+MOST_LEFT, MOST_UNLIKE, FEWEST_UNLIKE = 0.08, 0.1, 3
+"""Of its depth a blurred disc may leave so much at the edge of a droplet: sharp, noisy, compressed and flattened ones
+leave 0.06 at most, rings that are 3 % too large 0.07 to 0.12. So many may be otherwise; fewer than three are chance."""
+
 
 def flat_doubts(found: FlatDroplets) -> list[str]:
     """Why means of an image are not those of the spray."""
@@ -22,13 +26,14 @@ def flat_doubts(found: FlatDroplets) -> list[str]:
     doubts = (
         _unmeasured(found) or chosen_by_size(found.diameters_px, found.lacking_px),
         _saturated(found),
+        no_discs(found.edge_residuals),
         crowded(overlapping, found.left_out.get("not_round", 0), len(found)),
     )
     return [doubt for doubt in doubts if doubt]
 
 
 def chosen_by_size(measured_px: FloatArray, lacking_px: FloatArray) -> str:
-    """Mostly small droplets are too small, or not sharp enough, to be sized: means are of the others.
+    """Mostly small droplets are too small, too faint, or not sharp enough, to be sized: means are of the others.
 
     Parameters
     ----------
@@ -41,9 +46,29 @@ def chosen_by_size(measured_px: FloatArray, lacking_px: FloatArray) -> str:
     if larger <= MOST_LARGER:
         return ""
     return (
-        f"{len(lacking_px)} of {len(lacking_px) + len(measured_px)} droplets are unsharp or too small to be sized, and "
-        f"mostly small ones: D10 is about {100 * larger:.0f} % too large for what is seen, limit "
+        f"{len(lacking_px)} of {len(lacking_px) + len(measured_px)} droplets are unsharp, too small or too faint to be "
+        f"sized, and mostly small ones: D10 is about {100 * larger:.0f} % too large for what is seen, limit "
         f"{100 * MOST_LARGER:.0f} %; focus, take shorter pulses or more magnification"
+    )
+
+
+def no_discs(edge_residuals: FloatArray) -> str:
+    """Blurred discs are not what droplets look like at their edges: nor are their diameters.
+
+    Parameters
+    ----------
+    edge_residuals : (N,) array
+        As in ``FlatDroplets``.
+    """
+    known = edge_residuals[np.isfinite(edge_residuals)]
+    unlike = known[known > MOST_LEFT]
+    if len(unlike) < FEWEST_UNLIKE or len(unlike) <= MOST_UNLIKE * len(known):
+        return ""
+    return (
+        f"{len(unlike)} of {len(known)} droplets, limit {100 * MOST_UNLIKE:.0f} %, are no blurred discs: these leave "
+        f"{100 * np.median(unlike):.0f} % of their depth at edges, limit {100 * MOST_LEFT:.0f} %, and diameters may be "
+        "5 to 40 % wrong; are they bubbles or rings, two droplets that look like one, or was a threshold set, or grey "
+        "values made few?"
     )
 
 

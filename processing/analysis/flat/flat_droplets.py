@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from processing.analysis.flat.blurred_disc import LEVELS, flattening, unblurred
 from processing.analysis.flat.darkness import Darkness, Image, darkness_of
+from processing.analysis.flat.edge_residuals import edge_residuals
+from processing.analysis.flat.faint_spots import faint_diameters
 from processing.analysis.flat.flat_settings import FlatSettings
 from processing.analysis.flat.judged_spots import LeftOut, MeasuredSpot, SeenSpot, judged_spot
 from processing.analysis.flat.outline import Outline, outline_around
@@ -50,12 +52,16 @@ class FlatDroplets:
         room in it, and its blur is not a number.
     whole_shares : (N,) array
         Share of the image in which the centre of one as large may lie if it is seen whole.
+    edge_residuals : (N,) array
+        Standard deviation, beyond the noise, of what the blurred disc leaves of the image at its edge, of its depth;
+        not a number where it overlaps.
     left_out : dict of reason to number
-        What was seen and is not among them: ``border``, ``not_round``, ``unsharp``, ``small``, ``saturated``.
+        What was seen and is not among them: ``border``, ``not_round``, ``unsharp``, ``small``, ``faint``,
+        ``saturated``.
     image_size_px : int, int
         Columns and rows of the image.
     lacking_px : (M,) array
-        About how large those are that were left out as ``unsharp`` or ``small``.
+        About how large those are that were left out as ``unsharp``, ``small`` or ``faint``.
     """
 
     centres_px: FloatArray
@@ -66,6 +72,7 @@ class FlatDroplets:
     circularity: FloatArray
     overlapping: NDArray[np.bool_]
     whole_shares: FloatArray
+    edge_residuals: FloatArray
     left_out: dict[str, int]
     image_size_px: tuple[int, int] = (0, 0)
     lacking_px: FloatArray = field(default_factory=lambda: np.empty(0))
@@ -74,7 +81,7 @@ class FlatDroplets:
     def none(cls) -> "FlatDroplets":
         """No droplets."""
         empty = np.empty(0)
-        return cls(np.empty((0, 2)), empty, empty, empty, empty, empty, np.empty(0, bool), empty, {})
+        return cls(np.empty((0, 2)), empty, empty, empty, empty, empty, np.empty(0, bool), empty, empty, {})
 
     def __len__(self) -> int:
         return len(self.diameters_px)
@@ -91,6 +98,7 @@ class FlatDroplets:
             "circularity": self.circularity,
             "overlapping": self.overlapping.astype(np.uint8),
             "whole_share": self.whole_shares,
+            "edge_residual": self.edge_residuals,
         }
 
 
@@ -131,10 +139,11 @@ def measure_flat(
     least = max(how.least_depth, NOISES * SMOOTHED_NOISE * seen.noise)
     spots = find_spots(smoothed, 0.5 * least, least)
     results = _measured_once(seen, smoothed, spots, how, least)
+    results += [LeftOut("faint", size_px) for size_px in faint_diameters(seen.values, smoothed, least).tolist()]
     lacking = [result for result in results if isinstance(result, LeftOut)]
     sized_px = np.array([one.diameter_px for one in lacking if one.diameter_px is not None], np.float64)
-    rows = [result.row for result in results if isinstance(result, MeasuredSpot)]
-    table = np.array(rows, dtype=np.float64).reshape(-1, 8)
+    told = [result for result in results if isinstance(result, MeasuredSpot)]
+    table = np.array([one.row for one in told], dtype=np.float64).reshape(-1, 8)
     return FlatDroplets(
         centres_px=table[:, :2] + (seen.first_column, seen.first_row),
         diameters_px=table[:, 2],
@@ -145,9 +154,18 @@ def measure_flat(
         overlapping=table[:, 7] > 0,
         whole_shares=whole_shares(table[:, 2], seen.values.shape),
         left_out=dict(Counter(one.reason for one in lacking)),
+        edge_residuals=_edge_residuals(seen, told),
         lacking_px=sized_px,
         image_size_px=(np.shape(image)[1], np.shape(image)[0]),
     )
+
+
+def _edge_residuals(seen: Darkness, told: list[MeasuredSpot]) -> FloatArray:
+    """Of those that overlap no other; of several discs that make an outline together the blur is not known, either."""
+    discs = {index: disc for index, one in enumerate(told) if (disc := one.disc) is not None}
+    residuals = np.full(len(told), np.nan)
+    residuals[list(discs)] = edge_residuals(seen.values, seen.noise, list(discs.values()))
+    return np.where([one.overlapping for one in told], np.nan, residuals)
 
 
 def _measured_once(

@@ -1,20 +1,34 @@
 """What becomes of a spot that has an outline: a droplet, several, or one that cannot be sized."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from processing.analysis.flat.blurred_disc import unblurred
 from processing.analysis.flat.discs_in_outline import Disc, discs_in
+from processing.analysis.flat.edge_residuals import ToldDisc
 from processing.analysis.flat.flat_settings import FlatSettings
 from processing.analysis.flat.outline import Outline
+from processing.geometry import FloatArray
 
 
 @dataclass(frozen=True)
 class MeasuredSpot:
-    """A droplet: column, row, diameter, raw diameter, blur, depth, circularity, overlapping."""
+    """A droplet: column, row, diameter, raw diameter, blur, depth, circularity, overlapping; what makes it a circle."""
 
     row: tuple[float, ...]
+    stretch: FloatArray = field(default_factory=lambda: np.eye(2))
+
+    @property
+    def overlapping(self) -> bool:
+        """Whether another shadow reaches into its outline."""
+        return self.row[-1] > 0
+
+    @property
+    def disc(self) -> ToldDisc | None:
+        """What it looks like; None where it is one of several discs that make an outline together."""
+        column, row, diameter_px, _, blur_px, depth, *_ = self.row
+        return None if np.isnan(blur_px) else ToldDisc(row, column, diameter_px / 2, blur_px, depth, self.stretch)
 
 
 @dataclass(frozen=True)
@@ -56,7 +70,8 @@ def judged_spot(seen: SeenSpot, how: FlatSettings) -> list[MeasuredSpot | LeftOu
         return [LeftOut("unsharp", 2 * radius_px)]
     row, column = seen.outline.centre_px
     disturbed = float(seen.disturbed)
-    return [MeasuredSpot((column, row, 2 * radius_px, raw_px, blur_px, seen.depth, circularity, disturbed))]
+    told = (column, row, 2 * radius_px, raw_px, blur_px, seen.depth, circularity, disturbed)
+    return [MeasuredSpot(told, seen.outline.stretch)]
 
 
 def _overlapping(disc: Disc, depth: float, circularity: float) -> MeasuredSpot:

@@ -56,6 +56,15 @@ class Outline:
             float(((column[:-1] + column[1:]) * cross).sum()) / (3 * total),
         )
 
+    @property
+    def stretch(self) -> FloatArray:
+        """Matrix (2, 2), rows first, that makes the ellipse of its second moments a circle as large."""
+        moments = cv2.moments(self.points[:, None, ::-1].astype(np.float32))
+        spread = np.array([[moments["mu02"], moments["mu11"]], [moments["mu11"], moments["mu20"]]])
+        squares, axes = np.linalg.eigh(spread)
+        lengths = np.sqrt(np.maximum(squares, 1e-9))
+        return np.asarray((axes * (np.sqrt(lengths.prod()) / lengths)) @ axes.T)
+
 
 def outline_around(values: NDArray[np.float32], level: float, inside: tuple[int, int]) -> Outline | None:
     """The outermost outline at a level around a pixel; None where it leaves the image.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_file import FRAME, StoredDroplets, write_columns
 from processing.analysis.droplets.size_statistics import mean_diameters
 from processing.analysis.flat.darkness import LightError
-from processing.analysis.flat.flat_doubts import chosen_by_size, crowded, flat_doubts
+from processing.analysis.flat.flat_doubts import chosen_by_size, crowded, flat_doubts, no_discs
 from processing.analysis.flat.flat_droplets import FlatDroplets, measure_flat
 from processing.analysis.flat.flat_settings import FlatSettings
 from processing.analysis.flat.repeated import Discs, counted_twice
@@ -140,7 +140,8 @@ def doubts_together(shots: Sequence[StoredDroplets], um_per_px: float | None) ->
         np.concatenate([np.empty(0), *(np.asarray(one.columns[f"diameter_{unit}"], float) for one in shots)]) / scale
     )
     lacking_px = np.array([size for one in told for size in one.get("lacking_px", ())], np.float64)
-    doubts = (crowded(overlapping, clumps, len(sizes_px)), chosen_by_size(sizes_px, lacking_px))
+    residuals = np.concatenate([np.empty(0), *(np.asarray(shot.columns["edge_residual"], float) for shot in shots)])
+    doubts = (crowded(overlapping, clumps, len(sizes_px)), chosen_by_size(sizes_px, lacking_px), no_discs(residuals))
     return tuple(doubt for doubt in doubts if doubt)
 
 

@@ -103,6 +103,22 @@ def test_an_image_of_shadows_that_lie_over_one_another_is_doubtful(
     assert ["overlap others or are no discs" in what for what in result["doubts"]] == [True] * crowded
 
 
+def test_images_of_which_each_has_few_rings_are_doubted_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Bubbles of thin walls are told 6 to 16 % too large; two in an image are chance, four in two images are not."""
+    alone = [(25.0 + 40 * k, 40.0, 16.0) for k in range(2)]
+    hollow = grey([*alone, (110.0, 40.0, 13.0), (160.0, 100.0, 15.0)]) + LIGHT
+    hollow = hollow - shadow([(110.0, 40.0, 10.0), (160.0, 100.0, 11.5)], 1.0)
+    paths = [tmp_path / "one.png", tmp_path / "two.png"]
+    cv2.imwrite(str(paths[0]), np.round(hollow).astype(np.uint8))
+    cv2.imwrite(str(paths[1]), np.round(hollow[::-1, ::-1]).astype(np.uint8))
+    result = told(capsys, "measure", *paths, "-o", tmp_path / "out")
+    assert [shot["verdict"] for shot in result["shots"]] == ["good", "good"]
+    (doubt,) = (what for what in result["doubts"] if "no blurred discs" in what)
+    assert doubt.startswith("4 of 8 droplets, limit 10 %, are no blurred discs")
+
+
 def test_means_know_that_the_border_cuts_large_droplets_more_often(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
