@@ -44,7 +44,12 @@ class SightLattice:
     @property
     def motion_px(self) -> FloatArray:
         """What a motion of the whole volume by a voxel along x, y, z moves on average in the images: (2 views, 3)."""
-        spans = [np.diff(self.nodes_px, axis=axis).mean(axis=(1, 2, 3)) for axis in (3, 2, 1)]
+        # Steps add up to what lies between the two ends.
+        spans = [
+            (last - first).mean(axis=(1, 2)) / (self.nodes_px.shape[axis] - 1)
+            for axis in (3, 2, 1)
+            for first, last in [(self.nodes_px.take(end, axis) for end in (0, -1))]
+        ]
         return np.stack(spans, axis=-1).reshape(-1, 3) / self.spacing
 
     @property
