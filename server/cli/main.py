@@ -9,6 +9,7 @@ import re
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 from daq.errors import DaqError, PlanError, ShotFileError
@@ -129,7 +130,9 @@ class _Parser(ArgumentParser):
         say(message, file or sys.stderr, end="")
 
 
+@cache
 def _parser() -> ArgumentParser:
+    """Of all commands; it takes a tenth of the start, and stays as it is."""
     parser = _Parser(prog="tomoshadow", description="Tomographic shadowgraphy, from trigger to volume.")
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
     for command in COMMANDS:
