@@ -16,6 +16,8 @@ from processing.geometry import FloatArray
 
 TRIED_VIEWS = 4
 """So many views shots had, along lines that are apart, and knew each of the droplets."""
+TWIN_DROPLETS, MOST_TWINS = 60, 5
+"""Twins together have so many droplets, if so many twins do: of 12 droplets of a single one two are no share."""
 CROWD_PX = 20.0
 """So far around a droplet others crowd it."""
 LEAST_CROWDING, LEAST_RESIDUAL = 0.01, 0.5
@@ -114,9 +116,15 @@ class Reality:
         return np.where(tried, expit(self.base + evidence.columns @ np.array(self.weights)), np.nan)
 
 
-def twins_of(asked: int, views: int, directions: int) -> int:
-    """How many twins to make: one at least where views are not four, and apart, as then no probability tells ghosts."""
-    return asked or int(not views == directions == TRIED_VIEWS)
+def twins_of(asked: int, views: int, directions: int, droplets: int) -> int:
+    """How many twins to make of so many droplets.
+
+    Where views are not four, and apart, no probability tells ghosts: there is one at least then, and as many as it
+    takes for a share.
+    """
+    if asked or views == directions == TRIED_VIEWS:
+        return asked
+    return int(np.clip(-(-TWIN_DROPLETS // max(droplets, 1)), 1, MOST_TWINS))
 
 
 def crowding(seen_px: FloatArray, areas_px2: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from processing.runs.liquid.objects import NozzleNumbers
 from processing.runs.measured_images import IgnoredPixels
 from processing.runs.recipe import recipe_sha256
 
-METHOD_VERSION = 13
+METHOD_VERSION = 14
 """Of what the numbers in a file of droplets mean."""
 
 

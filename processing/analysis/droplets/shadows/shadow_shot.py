@@ -113,7 +113,7 @@ def measure_shadows(
     if told.verdict is ShotVerdict.GOOD:
         told = told.doubted(proportion_doubts(shot, search, fit))
     told = told_real(told)
-    count = twins_of(twins, len(images), search.lattice.directions)
+    count = twins_of(twins, len(images), search.lattice.directions, len(told.droplets))
     if not count or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)

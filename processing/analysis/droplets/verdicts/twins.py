@@ -9,8 +9,9 @@ from processing.analysis.droplets.ghost_share import GhostShare, matches
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, Rows, Seen
 from processing.geometry import FloatArray
 
-MANY_GHOSTS = 0.1
-"""Share in a twin from which on a shot is doubtful: ghosts can explain images as well as the truth does."""
+MANY_GHOSTS, SURE = 0.1, 1.0
+"""Share in twins beyond which, by so many standard deviations of chance, a shot is doubtful: ghosts can explain images
+as well as the truth does."""
 TWIN_MOVE_VOXEL = 15.0
 """So far at most droplets of a twin are moved along every axis: chance alignments are new, density stays."""
 
@@ -18,7 +19,7 @@ TWIN_MOVE_VOXEL = 15.0
 def judged_by_twins(shot: MeasuredExposure[Rows, Seen], ghosts: GhostShare) -> MeasuredExposure[Rows, Seen]:
     """A shot with the ghosts of its twins; doubtful where they are many, however well droplets explain the images."""
     shot = replace(shot, twins=ghosts)
-    if ghosts.share is None or ghosts.share <= MANY_GHOSTS:
+    if ghosts.share is None or ghosts.ghosts - SURE * np.sqrt(ghosts.ghosts) <= MANY_GHOSTS * ghosts.found:
         return shot
     reason = (
         f"of the droplets of a twin {100 * ghosts.share:.0f} % are ghosts, limit {100 * MANY_GHOSTS:.0f} %: too many "
