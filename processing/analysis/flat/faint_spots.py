@@ -16,6 +16,8 @@ FAINTEST = 0.25
 """Of the depth that a droplet stands out by: fainter ones are the unevenness of a light."""
 NOISES = 6.0
 """Standard deviations of the noise where nothing is seen."""
+NOISE_PX = 31
+"""Rows and columns that tell it: a light that falls off changes little in them."""
 HALO_PX = 5
 """Beside a spot that is seen: its tail and its fringes."""
 LEVEL = 0.25
@@ -40,8 +42,8 @@ def faint_diameters(values: Image, smoothed: Image, least: float) -> FloatArray:
         Diameters in px of circles as large as what is above half of the height of each; none at the border.
     """
     free = ~_seen(smoothed, least)
-    even = np.asarray(cv2.GaussianBlur(cv2.medianBlur(values, 3), (0, 0), 1.0), np.float32)
-    raised = even - _around(even, free)
+    even = np.asarray(cv2.GaussianBlur(_without_single_pixels(values), (0, 0), 1.0), np.float32)
+    raised = even - _around(even, free, max(int(LEVEL * min(values.shape)), 3))
     height = np.maximum(FAINTEST * least, NOISES * _noise(raised, values - even, free))
     count, labels, boxes, _ = cv2.connectedComponentsWithStats((raised > 0.5 * height).astype(np.uint8))
     faint = _holding(labels, raised > height, count) & ~_holding(labels, ~free, count) & _spots(boxes, values.shape)
@@ -49,12 +51,19 @@ def faint_diameters(values: Image, smoothed: Image, least: float) -> FloatArray:
     return np.array(sizes_px, np.float64)
 
 
+def _without_single_pixels(values: Image) -> Image:
+    """None is above all of its neighbours: what lights or fails alone is the camera's."""
+    around = np.ones((3, 3), np.uint8)
+    around[1, 1] = 0
+    return np.asarray(np.minimum(values, cv2.dilate(values, around)), np.float32)
+
+
 def _noise(raised: Image, rough: Image, free: NDArray[np.bool_]) -> Image:
     """Of smoothed values, which is more where single pixels have more: faint spots are not among what these have."""
     some = free[::2, ::2]
     if not some.any():
         return np.full_like(raised, np.inf)
-    around = _around(np.abs(rough), free)
+    around = _around(np.abs(rough), free, NOISE_PX)
     uneven = around / max(float(np.median(around[::2, ::2][some])), 1e-6)
     return np.asarray(1.4826 * float(np.median(np.abs(raised[::2, ::2][some]))) * np.maximum(uneven, 1), np.float32)
 
@@ -74,9 +83,8 @@ def _holding(labels: NDArray[Any], pixels: NDArray[np.bool_], count: int) -> NDA
     return np.asarray(held)
 
 
-def _around(values: Image, free: NDArray[np.bool_]) -> Image:
-    """Mean of what is around each pixel, where nothing is seen."""
-    width = max(int(LEVEL * min(values.shape)), 3)
+def _around(values: Image, free: NDArray[np.bool_], width: int) -> Image:
+    """Mean of so many rows and columns around each pixel, where nothing is seen."""
     weights = free.astype(np.float32)
     mean = cv2.blur(values * weights, (width, width)) / np.maximum(cv2.blur(weights, (width, width)), 1e-3)
     return np.asarray(mean, np.float32)

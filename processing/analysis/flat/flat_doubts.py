@@ -70,8 +70,8 @@ def no_discs(edge_residuals: FloatArray) -> str:
     return (
         f"{len(unlike)} of {len(known)} droplets, limit {100 * MOST_UNLIKE:.0f} %, are no blurred discs: these leave "
         f"{100 * np.median(unlike):.0f} % of their depth at edges, limit {100 * MOST_LEFT:.0f} %, and diameters may be "
-        "5 to 40 % wrong; are they bubbles or rings, two droplets that look like one, or was a threshold set, or grey "
-        "values made few?"
+        "5 to 40 % wrong; are they bubbles or rings, two droplets that look like one, or was a threshold set, the "
+        "image sharpened, or grey values made few?"
     )
 
 

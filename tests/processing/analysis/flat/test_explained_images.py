@@ -43,9 +43,10 @@ def test_dim_small_particles_are_counted_and_means_doubted() -> None:
     assert "too faint to be sized, and mostly small ones" in said
 
 
-def test_specks_beside_large_droplets_are_counted() -> None:
-    """Discs of 1.5 px, ten times as many as were told: D10 was six times too large."""
-    specks = [(x + 17, y + 18, 1.5) for x, y in PLACES[:17]]
+@pytest.mark.parametrize("size_px", [1.0, 1.5])
+def test_specks_beside_large_droplets_are_counted(size_px: float) -> None:
+    """Ten times as many as were told: D10 was six times too large."""
+    specks = [(x + 17, y + 18, size_px) for x, y in PLACES[:17]]
     said, found = doubts(noisy(seen([*spread_discs(some=slice(3)), *specks])))
     assert len(found) == 3
     assert found.left_out.get("faint", 0) >= 15
@@ -132,6 +133,14 @@ def test_what_discs_explain_stays_good(name: str) -> None:
     said, found = doubts(GOOD[name]())
     assert said == ""
     assert found.left_out == {}
+
+
+@pytest.mark.parametrize("bright", [False, True])
+def test_pixels_that_fail_alone_are_no_droplets(bright: bool) -> None:
+    image = noisy(1.05 - seen(spread_discs()) if bright else seen(spread_discs()))
+    image[tuple(np.random.default_rng(7).integers(3, np.array(SHAPE) - 3, (30, 2)).T)] = 230 if bright else 0
+    said, found = doubts(image, bright)
+    assert (said, found.left_out) == ("", {})
 
 
 @pytest.mark.parametrize("quality", [95, 80])
