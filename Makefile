@@ -107,7 +107,7 @@ fuzz-import: setup ## Damage manifests, tables and images in FUZZ_IMPORTS=2000 w
 HUNT = $(if $(MINUTES),--minutes $(MINUTES)) $(if $(SEED),--seed $(SEED)) $(if $(CASES),--cases $(CASES)) \
 	$(if $(WORLD),--world "$(WORLD)") $(if $(DISTORTIONS),--distortions "$(DISTORTIONS)") $(if $(AMOUNT),--amount $(AMOUNT))
 hunt: export OPENBLAS_NUM_THREADS := 1
-hunt: setup ## Hunt for lies for MINUTES=10: known sprays, distorted by chance, are measured and judged; build/hunt.jsonl keeps each. SEED=7 CASES=1 is one of them again; WORLD=few, DISTORTIONS="veil+gamma" and AMOUNT=0.5 choose. TABLE=lights writes the table of lights in docs/measure.md anew.
+hunt: setup ## Hunt for lies for MINUTES=10: known sprays, distorted by chance, are measured and judged; build/hunt.jsonl keeps each. SEED=7 CASES=1 is one of them again; WORLD=few, DISTORTIONS="veil+gamma" and AMOUNT=0.5 choose. TABLE=lights writes the table of lights in docs/droplets-found.md anew.
 	@$(PYTHON) -m $(if $(TABLE),tests.hunt.$(TABLE),tests.hunt --json build/hunt.jsonl $(HUNT))
 
 soak: setup ## PART=kill: kill the server TIMES=100 times while it records, and count what is lost; goes on where it was interrupted. PART=faults: lose each device TIMES=10 times, and time the next run. PART=light: let everything go wrong in runs TIMES=20 times, and time how it becomes dark. PART=cluster: kill and cut off parts of a cluster TIMES=20 times. PART=workers: how busy two workers are with TIMES=16 shots. PART=long: record TIMES=10000 shots, count what is lost, and watch the memory.

@@ -11,8 +11,9 @@ import pytest
 
 from processing.calibration.sets.calibration_set import load_calibration_set
 from server.cli.main import main
+from tests.hunt import lights
 from tests.support.sampled_sprays import cone_shots, write_results
-from tests.support.write_measured import PARTS
+from tests.support.write_measured import PARTS, replaced
 from tests.support.write_rig_file import rig_file_page
 
 ROOT = Path(__file__).parents[1]
@@ -154,6 +155,10 @@ def test_the_page_of_the_rig_file_is_that_of_the_models() -> None:
     )
 
 
+def test_the_table_of_lights_is_where_it_is_written_anew() -> None:
+    assert replaced(lights.PAGE.read_text(), "lights", "another table").count("another table") == 1
+
+
 def test_every_measured_table_is_there() -> None:
     page = (DOCS / "measured.md").read_text()
     for name in [*PARTS, "bench"]:
@@ -233,10 +238,10 @@ def test_the_code_that_reads_runs_reads_them() -> None:
 def test_five_lines_give_a_d32_and_five_a_velocity_with_intervals(capsys: pytest.CaptureFixture[str]) -> None:
     velocity = '{"verdict": "good", "reasons": [], "pairs": 120, "stayed": 125}'
     write_results(Path("demo-out/runs/demo_sample/results/droplets-0"), cone_shots(0, 1, 120), velocity=velocity)
-    blocks = [block for block in python_of(DOCS / "measure.md") if "demo-out" in block]
-    for block in blocks:
+    for page in ("measure.md", "spray.md"):
+        (block,) = [block for block in python_of(DOCS / page) if "demo-out" in block]
         assert len([line for line in block.splitlines() if line]) == 5
-        exec(compile(block, "measure.md", "exec"), {})
+        exec(compile(block, page, "exec"), {})
     interval = r"95 % between \d+\.\d+ and \d+\.\d+"
     assert re.fullmatch(rf"v \d\.\d\d m/s, {interval}\nD32 \d+\.\d um, {interval}", capsys.readouterr().out.strip())
 

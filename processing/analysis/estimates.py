@@ -3,7 +3,7 @@
 The standard deviation of ``ln D`` among the draws, times ``sqrt(m / (m - 1))`` for the bias of few, times Student's t
 of ``m - 1`` degrees of freedom, with ``m`` drawn things; figures that may be negative as they are, not by their
 logarithm. Percentiles of the draws and Efron's BCa hold the truth far less often where shots are few: see
-``docs/measure.md``.
+``docs/spray.md``.
 """
 
 from collections.abc import Callable, Iterator, Sequence

@@ -1,4 +1,4 @@
-"""All distortions by name, and what a line of ``not_checked`` must hold to have named one: see ``docs/measure.md``."""
+"""All distortions by name, and what a line of ``not_checked`` must hold to have named one: see ``docs/how-sure.md``."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -22,7 +22,7 @@ SURE = 1.5
 NEAR_MM = 2.5 / SCALE_PX_PER_MM
 """A told droplet that far from any true one is none."""
 LEAST_STRAY, LEAST_STRAYS = 0.1, 3
-"""Share of the droplets, and number, that may be missed or be ghosts: docs/measure.md promises fewer, in the mean."""
+"""Share of the droplets, and number, that may be missed or be ghosts: docs/how-sure.md promises fewer, in the mean."""
 SIZES = ("d10_um", "d32_um", "d43_um", "dv10_um", "dv50_um", "dv90_um")
 OF_B = " b"
 """Ends what is told of droplets in exposure B, which a doubt of velocities casts doubt on, too: A again, or another."""

@@ -1,5 +1,5 @@
 # ruff: noqa: T201
-"""Writes the table of lights in docs/measure.md anew: what ten shots of each light gave.
+"""Writes the table of lights in docs/droplets-found.md anew: what ten shots of each light gave.
 
     python -m tests.hunt.lights [--light NAME] [--page FILE]
 
@@ -22,7 +22,7 @@ from tests.hunt.rig import SCALE_PX_PER_MM, eyes
 from tests.hunt.world import Cloud, World, placed, taken
 from tests.support.write_measured import replaced
 
-PAGE = Path(__file__).parents[2] / "docs" / "measure.md"
+PAGE = Path(__file__).parents[2] / "docs" / "droplets-found.md"
 SHOTS = (*((count, noise) for count in (12, 40, 120) for noise in (0.005, 0.011, 0.015)), (300, 0.011))
 """Droplets, and standard deviation of the noise over the light."""
 BLUR_PX = 0.75

@@ -24,7 +24,7 @@ MODEL_SD = 0.2
 MANY_OBJECTS = 0.01
 """Ligaments and the like per droplet: they may have round ends, which are told as droplets, and surely real ones."""
 BESIDE_LIQUID = f"it was not tried beside more ligaments and the like than {100 * MANY_OBJECTS:g} % of the droplets"
-UNTRIED = "it was not tried on droplets like the others: docs/measure.md lists on which it was"
+UNTRIED = "it was not tried on droplets like the others: docs/how-sure.md lists on which it was"
 _TAIL = (1 - CONFIDENCE) / 2
 
 

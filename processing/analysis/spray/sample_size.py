@@ -4,7 +4,7 @@ ASTM E799 asks for a sample that is large enough, and that no extreme drop carri
 shots, and those of one are not independent: the size of the sample is judged by the interval over shots, and the
 extreme drop by its share of the volume. **The limit of 2 % is measured, not the standard's**: below it, 90 % intervals
 of D32, Dv0.5, span and flux of 3 to 40 shots hold the truth in 85 to 90 %, from 2 to 4 % in 80 to 88 %, beyond in 50
-to 83 % (``docs/measure.md``).
+to 83 % (``docs/spray.md``).
 """
 
 from math import ceil, sqrt
