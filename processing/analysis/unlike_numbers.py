@@ -88,8 +88,9 @@ def _seen_parts(told: Sequence[tuple[StoredDroplets, Sequence[Mapping[str, Any]]
 
 
 def _within_chance(counts: NDArray[Any]) -> tuple[NDArray[Any], FloatArray, FloatArray]:
-    """Droplets that are seen of each shot, and fewer and more that chance may well make of as many."""
-    return counts, counts - np.sqrt(counts), np.maximum(counts + np.sqrt(counts), 1.0)
+    """Droplets that are seen of each shot, and fewer and more that chance may well make of a median of as many."""
+    chance = np.sqrt(counts / max(len(counts) - 1, 1))
+    return counts, counts - chance, np.maximum(counts + chance, 1.0)
 
 
 def _by_the_others(counts: NDArray[Any], parts: FloatArray) -> list[float]:
