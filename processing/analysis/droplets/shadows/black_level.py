@@ -64,7 +64,8 @@ class BlackLevel:
         return (
             f"shadows look as if behind a veil of {told}, {limit}: is a dark image missing (the camera's black level), "
             "is there stray light, are grey values not in proportion to light (gamma), is the light on twice within an "
-            "exposure, or are droplets not opaque? Diameters are too small then, and the number may be wrong",
+            "exposure, or are droplets not opaque, as those that pass light in their middle? Diameters are too small "
+            "then, and the number may be wrong",
         )
 
 

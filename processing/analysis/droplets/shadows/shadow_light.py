@@ -105,7 +105,7 @@ def grey(seen: DiscImages, shadows: Shadows) -> tuple[str, ...]:
     return (
         f"{100 * share:.0f} % of the light is left where shadows should be black, limit {100 * MOST_LEFT:.0f} %: is a "
         "dark image missing (the camera's black level), are grey values not in proportion to light (gamma), or are "
-        "droplets not opaque? Diameters are wrong then",
+        "droplets not opaque, as those that pass light in their middle? Diameters are wrong then",
     )
 
 
@@ -142,5 +142,6 @@ def unlike_discs(residual: FloatArray) -> str:
     share = f"{100 * unlike / len(residual):.0f} % of {len(residual)} droplets, limit {100 * MANY_UNLIKE:.0f} %"
     return (
         f"{share}, do not look like round opaque discs: do they move by more than their blur while the light is on, is "
-        "the light on twice within an exposure, or are images processed? Number and diameters are wrong then"
+        "the light on twice within an exposure, do they pass light in their middle, or are images processed? Number "
+        "and diameters are wrong then"
     )
