@@ -16,10 +16,11 @@ from processing.reconstruction.settings import GridSettings
 from processing.runs.run_around import of_another_run
 
 _NAME = re.compile(r"shot_(\d+)_droplets")
+NO_SPRAY = "has droplets of images, in 2-D: they have no place in a spray; measure --json tells their means"
 
 
 def read_in_place(path: str | Path) -> StoredDroplets:
-    """Read a file of droplets that are what was measured, under the name of their shot, in the folder of their run.
+    """Read a file of droplets in space that are what was measured, under the name of their shot, in their run.
 
     Raises
     ------
@@ -30,6 +31,8 @@ def read_in_place(path: str | Path) -> StoredDroplets:
     path = Path(path)
     stored = read_droplets(path)
     _require_own_name(path, stored.provenance)
+    if "um_per_px" in stored.provenance:
+        raise DropletFileError(f"{path}: {NO_SPRAY}")
     if SEAL not in stored.provenance:
         _require_in_box(path, stored)
     return stored

@@ -19,7 +19,7 @@ from processing.analysis.spray.spray_sample import box_told
 from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
 from processing.analysis.stored_json import stored_json
 from processing.count import counted
-from processing.runs.droplets_in_place import read_in_place
+from processing.runs.droplets_in_place import NO_SPRAY, read_in_place
 from processing.runs.not_checked import not_checked
 from processing.runs.sprays.conditions import axis_of, changes_told
 
@@ -121,9 +121,7 @@ def _of_run(run_dir: Path) -> Path:
 def _files(folder: Path) -> list[Path]:
     files = [*sorted(folder.glob(PATTERN)), *sorted(folder.glob(f"*/{PATTERN}"))]
     if not files and any(folder.glob("*_droplets.h5")):
-        raise DropletFileError(
-            f"{folder}: has droplets of images, in 2-D: they have no place in a spray; measure --json tells their means"
-        )
+        raise DropletFileError(f"{folder}: {NO_SPRAY}")
     if not files:
         raise DropletFileError(f"{folder}: has no droplets ({PATTERN}): name a directory that measure wrote with -o")
     return files

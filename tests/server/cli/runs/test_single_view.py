@@ -207,6 +207,16 @@ def write_single(run_dir: Path, **told_of_it: Any) -> Path:
     return run_dir
 
 
+@pytest.mark.parametrize("command", ["statistics", "report", "tracks", "separation"])
+def test_droplets_of_a_view_of_a_run_are_no_spray(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Their files are named as those of shots are."""
+    told(capsys, "measure", write_single(tmp_path / "single"), "-o", tmp_path / "out")
+    goes_to = ["-o", tmp_path / "made"] if command in ("report", "tracks") else []
+    assert "has droplets of images, in 2-D" in refused(capsys, command, tmp_path / "out", *goes_to)
+
+
 def test_a_run_of_one_view_is_measured_exposure_by_exposure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     result = told(capsys, "measure", write_single(tmp_path / "single"), "-o", tmp_path / "out")
     (shot,) = result["shots"]
