@@ -77,7 +77,8 @@ def _text(spray: "MeasuredSpray", told: "SprayStatistics") -> str:
     seen += twice(told)
     sample = f"; sample: {told.sample.verdict}" if told.sample else ""
     head = f"{spray.name}: {seen}; sampling: {told.sampling}{sample}"
-    return "\n".join([head, table(["", "", "95 %"], figure_rows(told)), *doubts(told), *spray.changes])
+    figures = [table(["", "", "95 %"], rows)] if (rows := figure_rows(told)) else []
+    return "\n".join([head, *figures, *doubts(told), *spray.changes])
 
 
 def _differences(found: "tuple[Difference, ...]") -> str:

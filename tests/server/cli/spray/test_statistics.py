@@ -82,6 +82,13 @@ def test_people_read_what_is_doubtful_and_why_figures_are_missing(
     assert "No share of ghosts: " in text
 
 
+def test_a_spray_without_a_figure_has_no_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = {"exposures": json.dumps({"a": {"verdict": "refused", "reasons": ["it is blurred"]}})}
+    none = [stored_shot(np.empty(0), np.empty((0, 3)), np.empty((0, 3)), shot) for shot in range(2)]
+    lines = shown(capsys, "statistics", write_results(tmp_path / "refused", none, **said)).splitlines()
+    assert lines[1].startswith("2 of 2 exposures are refused, and do not count")
+
+
 def test_quantiles_that_few_droplets_do_not_tell_have_a_reason(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
