@@ -115,7 +115,7 @@ def _first_asked(calls: Sequence[Call], off: Call) -> Iterator[str]:
         theirs = [call for call in calls if call.thread.startswith(threads)]
         seen_s = min((call.ended_s for call in theirs if call.shows_fault), default=float("inf"))
         for call in theirs:
-            if seen_s <= call.began_s < off.began_s and call.verb != "off":
+            if seen_s <= call.began_s < off.began_s and not call.confirms_off:
                 yield f"{call.device}: {call.verb}"
 
 

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from daq.errors import DeviceError
 from daq.faults import FaultKind
 from daq.files.run_directory import DoubleFrame, ExposureRecord, FiredTrain, ImageKey, RunReader, Shot
 from daq.run.limits import AcquisitionLimits
@@ -16,7 +15,7 @@ from server.cli.benchmarks.recorded_run import record_run
 from tests.support import soak_cluster, soak_faults, soak_light, soak_long, soak_workers
 from tests.support.simulated_serving import serving_bench, tiny_config
 from tests.support.soak_kill import Killed, kill_servers, mispaired_exposures, summary
-from tests.support.watched_rig import Call, Darkness, Witness
+from tests.support.watched_rig import Darkness
 
 VIEWS = ("view1", "view2")
 
@@ -149,23 +148,6 @@ def test_the_table_of_darkness_tells_what_was_never_confirmed() -> None:
     ]
     assert calm == "the run went on with the light: late"
     assert machine.endswith("load 0.5 to 0.5")
-
-
-def test_a_pulse_after_a_fault_and_a_question_before_the_light_is_off_are_found() -> None:
-    witness = Witness()
-
-    def call(verb: str, began_s: float, answer: object, thread: str = "acquisition") -> None:
-        witness.calls.append(Call(thread, "device", verb, began_s, began_s + 0.25, answer))
-
-    call("status", 1.0, DeviceError("device", "fault"), thread="lamp generator_0")
-    assert witness.darkness is None
-    call("collect", 2.0, DeviceError("device", "gone"), thread="frames-view1")
-    call("ask", 2.5, None, thread="a question-view1")
-    witness.pulses_s += [1.0, 2.75, 4.5]
-    call("off", 3.0, DeviceError("device", "no answer"))
-    call("off", 3.5, None)
-    call("arm", 4.0, None)
-    assert witness.darkness == Darkness(0.5, 1.5, ("device: ask", "device: off"))
 
 
 def test_the_table_of_a_cluster_counts_lost_shots() -> None:

@@ -1,7 +1,7 @@
 """The witness blames who asks on after a fault has been seen, and nobody who does not know of it yet."""
 
-from daq.errors import DeviceRefused
-from tests.support.watched_rig import Call, Witness
+from daq.errors import DeviceError, DeviceRefused
+from tests.support.watched_rig import Call, Darkness, Witness
 
 REFUSED = DeviceRefused("generator", "fault: interlock")
 
@@ -43,3 +43,20 @@ def test_calls_while_the_light_goes_off_or_after_it_are_no_fault() -> None:
     twice = call("acquisition", "generator", "off", (1.05, 2.0))
     reason = call("acquisition", "interlock", "is_closed", (2.0, 2.1), False)
     assert asked_before(FIRE, twice, OPEN, OFF, reason) == ()
+
+
+def test_a_pulse_after_a_fault_and_a_question_before_the_light_is_off_are_found() -> None:
+    witness = Witness()
+
+    def call(verb: str, began_s: float, answer: object, thread: str = "acquisition") -> None:
+        witness.calls.append(Call(thread, "device", verb, began_s, began_s + 0.25, answer))
+
+    call("status", 1.0, DeviceError("device", "fault"), thread="lamp generator_0")
+    assert witness.darkness is None
+    call("collect", 2.0, DeviceError("device", "gone"), thread="frames-view1")
+    call("ask", 2.5, None, thread="a question-view1")
+    witness.pulses_s += [1.0, 2.75, 4.5]
+    call("off", 3.0, DeviceError("device", "no answer"))
+    call("off", 3.5, None)
+    call("arm", 4.0, None)
+    assert witness.darkness == Darkness(0.5, 1.5, ("device: ask", "device: off"))
