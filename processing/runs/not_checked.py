@@ -75,7 +75,7 @@ def _unchecked(shots: Sequence[StoredDroplets], directed: bool) -> Iterator[Unch
         sizes_known=sizes_known,
         undirected=not directed and any(map(_is_double, shots)),
         stated_ns=_stated_ns(velocities),
-        unscaled=not sizes_known and not all(one.lengths for one in known),
+        unscaled=not all(one.lengths for one in known),
         shallow=not all(one.depth for one in known),
         sparse=not depth_known(sights) and not depth_reversed(sights),
     )

@@ -79,9 +79,19 @@ ORDER = Unchecked(
 LENGTHS = Unchecked(
     "whether calibration and shots were seen by the same lenses at the same focus: a factor of all lengths moves no "
     "view, and no droplet tells it",
-    "magnification and pixels, which runs of a rig have; or --sizes: dots of known diameters, seen by the same cameras",
+    "magnification and pixels, which runs of a rig have; --sizes corrects diameters alone: where all its dots are seen "
+    "larger, or smaller, by one factor, places and velocities are, too",
 )
 """Of runs from elsewhere."""
+
+
+RETICLE = Unchecked(
+    "whether the reticle of --sizes was seen as these shots are: by the same lenses, focus and light, and with grey "
+    "values as much in proportion to light. A gamma of 0.85 in its images alone makes droplets 5 % too large, and "
+    "leaves everything as well explained",
+    "nothing where settings of cameras and program were the same for both; else the reticle once more",
+)
+"""Of shadows whose diameters are corrected by dots."""
 
 
 DEPTH = Unchecked(
@@ -251,7 +261,7 @@ def unchecked_images(
     stated_ns : iterable of float
         Separations of double exposures that were stated, and no pulse tells them.
     unscaled : bool
-        Nobody recorded their magnification, nor compared diameters.
+        Nobody recorded their magnification.
     shallow : bool
         Perspective is too weak to tell near from far.
     sparse : bool
@@ -260,7 +270,7 @@ def unchecked_images(
     if polarity == "bright" or not sizes_known:
         yield SINGLE_PROPORTION if single and polarity == "shadow" else PROPORTION[polarity]
     if polarity == "shadow" and not single:
-        yield from (OPAQUE,) if sizes_known else (LAMPS, OPAQUE)
+        yield from (RETICLE, OPAQUE) if sizes_known else (LAMPS, OPAQUE)
     if single:
         yield SCALE
         yield DEPTH_OF_FIELD
