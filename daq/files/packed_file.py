@@ -12,6 +12,7 @@ from daq.files.atomic_file import replacing
 from daq.files.columns import columns_of, frames_path
 from daq.files.header import RunHeader
 from daq.files.later_notes import document_of, read_changes
+from daq.files.references_file import require_references
 from daq.files.run_file import RUN_FILE, reading, shot_path, write_later_notes
 from daq.files.shot_file import LIBRARY_VERSIONS, create_frames, read_shot_of, reading_shot
 from daq.files.storage import storing
@@ -23,11 +24,13 @@ def pack_run(run_dir: Path, header: RunHeader, shot_count: int, out: Path) -> No
     Raises
     ------
     ShotFileError
-        A shot cannot be read, or its later notes: a packed run is complete or not there.
+        A shot cannot be read, or its later notes, or a reference is not what was written: a packed run is complete or
+        not there, and other programs compare no checksums.
     StorageError
         The disk of ``out`` refuses, or has no room for the run.
     """
     _require_room(run_dir, shot_count, out.parent)
+    require_references(run_dir, header)
     changes = read_changes(run_dir, header)
     with storing(out.parent), replacing(out) as part:
         shutil.copyfile(run_dir / RUN_FILE, part)

@@ -48,6 +48,12 @@ def read_reference(run_dir: Path, view: str, name: Reference) -> NDArray[np.floa
         return _read_images(file[path]) if path in file else None
 
 
+def require_references(run_dir: Path, header: RunHeader) -> None:
+    """Raise ShotFileError if one of them is not what was written; a view may have none."""
+    for view, name in product(header.views, _NAMES):
+        read_reference(run_dir, view, name)
+
+
 def damaged_references(run_dir: Path, header: RunHeader) -> Iterator[str]:
     """What is wrong with references, one text for each of them: damaged, or missing of some views only."""
     known: dict[Reference, list[str]] = {name: [] for name in _NAMES}

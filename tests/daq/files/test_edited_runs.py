@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -226,3 +227,13 @@ def test_a_shot_of_a_newer_program_is_called_so(run_dir: Path) -> None:
     edited(run_dir / "shots" / "1.h5", lambda file: file.attrs.modify("schema_version", 3))
     told = [flaw.text for flaw in verify(run_dir).flaws]
     assert [text.partition("1.h5: ")[2] for text in told] == ["version 3, this program reads 2: take a newer one"]
+
+
+@pytest.mark.parametrize("name", ["dark", "background"])
+def test_a_run_whose_references_are_not_what_was_written_is_not_packed(run_dir: Path, name: str) -> None:
+    """Other programs read the packed file, and compare no checksums: they would divide by another background."""
+    edited(run_dir / "run.h5", changed(f"cameras/view1/{name}"))
+    out = run_dir.parent / "packed.h5"
+    with suppress(ShotFileError):
+        pack(run_dir, out)
+    assert not out.exists()
