@@ -1,9 +1,11 @@
 """The pages of runs and results: whatever was recorded can be found again, and looked at; headless Chromium."""
 
+import json
 import re
 import shutil
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from playwright.sync_api import Locator, Page, expect
@@ -15,6 +17,8 @@ from processing.runs.volumes.pipeline import reconstruct_shots
 from processing.volume import VoxelGrid
 from server.lab.jobs.job import reconstruction_job
 from server.lab.results import keep_preview
+from server.pictures.previews import load_preview, load_provenance, save_preview
+from server.web.ui.results import droplet_panel, droplet_table
 from tests.server.web.test_api import wait_for_jobs
 from tests.support.desk import PICTURES, PULSE, choose_calibration, without_keys
 from tests.support.droplet_run import write_calibration, write_run
@@ -234,6 +238,35 @@ def test_both_exposures_lie_one_upon_the_other_and_another_method_is_tried(
     choose(page, "Slices, region by", re.compile("as made, SMART"))
     expect(resolution(page)).to_contain_text("SMART, preview only")
     expect(addresses).to_have_count(2)
+
+
+def test_what_speaks_against_a_volume_is_told_beside_its_slices(page: Page, server: Serving, old_run: Path) -> None:
+    """No job of this server knows of it, and a volume of which a view saw nothing looks as fine as any other."""
+    results_id = MLOS.results_id("c")
+    stored = old_run / "results" / results_id / "shot_00001_a.preview.npz"
+    spoken = {"verdict": "warn", "shots": [{"shot": 3}]}
+    told = {"blind_views": json.dumps(["view2"]), "belonging": json.dumps(spoken)}
+    save_preview(stored, load_preview(stored), {**load_provenance(stored), **told})
+    page.goto(url(server, f"results/{OLD}/{results_id}/1"))
+    expect(resolution(page)).to_have_text("MLOS, full resolution")
+    expect(page.get_by_text("exposure A: view2 sees nothing")).to_be_visible()
+    expect(page.get_by_text("droplets speak against run and calibration: warn (shot 3)")).to_be_visible()
+    page.goto(url(server, f"results/{OLD}/{results_id}/3"))
+    expect(resolution(page)).to_have_text("MLOS, full resolution")
+    expect(page.get_by_text("exposure A: view2 sees nothing")).to_be_hidden()
+
+
+def test_what_tables_of_droplets_leave_out_is_told(
+    page: Page, server: Serving, old_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a shot with more droplets than are listed the count was that of the rows."""
+    monkeypatch.setattr(droplet_table, "_SHOWN", 7)
+    monkeypatch.setattr(droplet_panel, "_SHOWN", 0)
+    page.goto(url(server, f"results/{OLD}/{MLOS.results_id('c')}/1"))
+    with h5py.File(old_run / "results" / "droplets-1" / "shot_00001_droplets.h5") as file:
+        there = len(file["droplets/frame"])
+    expect(page.get_by_text(f"{there} droplets, the largest 7 are listed")).to_be_visible()
+    expect(page.get_by_text("and 1 older set, not told here")).to_be_visible()
 
 
 def test_droplets_lie_over_the_slices_and_in_a_table_that_leads_to_them(

@@ -14,6 +14,7 @@ from server.lab.jobs.job import Job, JobKind, JobState
 from server.lab.jobs.job_table import JobTable
 from server.lab.jobs.replaced_calibrations import replaced_since
 from server.lab.services import Context
+from server.lab.volume_doubts import TRUSTED, belonging_told
 from server.lab.starting.calibrating import use_calibration
 from server.web.ui.asking import try_to
 from server.web.ui.run.run_panel import outcome_colour
@@ -22,7 +23,6 @@ from server.web.ui.theme import panel
 from server.web.ui.visiting import visitor
 
 _SHOWN = 60
-_TRUSTED = (Verdict.GOOD, Verdict.USABLE)
 
 
 class JobPanel:
@@ -150,16 +150,9 @@ def _volumes(job: Job) -> str:
 def _belonging(job: Job) -> str:
     """What droplets say against run and calibration, or that they say nothing; nothing where they agree."""
     asked = (job.result or {}).get(BELONGING)
-    if asked is None or asked["verdict"] in _TRUSTED:
-        return ""
-    shots = ", ".join(str(check["shot"]) for check in asked["shots"])
-    if asked["verdict"] is None and job.kind is JobKind.MEASUREMENT:
+    if asked is not None and asked["verdict"] is None and job.kind is JobKind.MEASUREMENT:
         return ""  # droplets have been fitted: their own verdict tells more
-    if not asked["shots"]:
-        return "not checked yet whether run and calibration belong together"
-    if asked["verdict"] is None:
-        return f"not checked whether run and calibration belong together (asked: shot {shots})"
-    return f"droplets speak against run and calibration: {asked['verdict']} (shot {asked['shots'][0]['shot']})"
+    return belonging_told(asked)
 
 
 def _is_doubtful(job: Job) -> bool:
@@ -167,7 +160,7 @@ def _is_doubtful(job: Job) -> bool:
     result = job.result or {}
     parts = [result, result.get("velocity") or {}, *_views(result).values()]
     verdicts = [part.get("verdict") for part in parts]
-    doubted = [verdict for verdict in verdicts if verdict not in (*_TRUSTED, ShotVerdict.GOOD, ShotVerdict.EMPTY, None)]
+    doubted = [verdict for verdict in verdicts if verdict not in (*TRUSTED, ShotVerdict.GOOD, ShotVerdict.EMPTY, None)]
     belonging = result.get(BELONGING, {}).get("verdict") in (Verdict.WARN, Verdict.REFUSE)
     return bool(doubted) or belonging or any(fault_lines(volume) for volume in result.get("volumes", ()))
 

@@ -48,6 +48,8 @@ class DropletPanel:
         """Tell of the result sets of a run; they are read again where their files have changed."""
         measured = [one.id for one in sets if one.droplets][:_SHOWN]
         rows = await asyncio.to_thread(lambda: [self._row(run_id, results_id) for results_id in measured])
+        if more := sum(bool(one.droplets) for one in sets) - len(rows):
+            rows.append({"id": "", "results": f"and {counted(more, 'older set')}, not told here"})
         self._panel.set_visibility(bool(rows))
         self._table.rows = rows
         self._table.update()

@@ -8,7 +8,7 @@ import numpy as np
 from nicegui import ui
 
 from daq.counted import counted
-from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.droplet_file import DIAMETER, StoredDroplets
 from server.web.ui.results.slice_group import Dots
 from server.web.ui.theme import panel
 
@@ -63,7 +63,7 @@ class DropletTable:
         rows = [row | {"leads": leads} for row in droplet_rows(droplets)] if droplets else []
         self._panel.set_visibility(droplets is not None)
         where = "a row leads to its place" if leads else "choose volumes above to see where they lie"
-        self._count.set_text(f"{counted(len(rows), 'droplet')}; {where}")
+        self._count.set_text(f"{count_text(droplets)}; {where}")
         self._table.rows = rows
         self._table.update()
 
@@ -72,12 +72,19 @@ class DropletTable:
         self._go_to((float(row["x_mm"]), float(row["y_mm"]), float(row["z_mm"])), str(row["exposure"]).lower())
 
 
+def count_text(droplets: StoredDroplets | None) -> str:
+    """How many there are, and how many of them the table lists."""
+    there = len(droplets.columns["frame"]) if droplets else 0
+    which = "largest" if droplets and DIAMETER in droplets.columns else "first"
+    return counted(there, "droplet") + (f", the {which} {_SHOWN} are listed" if there > _SHOWN else "")
+
+
 def droplet_rows(droplets: StoredDroplets) -> list[dict[str, Any]]:
     """Rows of the table: the largest ones first where diameters are known."""
     columns = {name: droplets.columns[name] for name in _COLUMNS if name in droplets.columns}
     frames = droplets.columns["frame"].astype("U1")
     order = np.arange(len(frames))
-    if "diameter_um" in columns:
+    if DIAMETER in columns:
         order = np.argsort(-np.nan_to_num(columns["diameter_um"].astype(np.float64)), kind="stable")
     rows = []
     for number in order[:_SHOWN].tolist():

@@ -10,6 +10,7 @@ from processing.reconstruction.volume_part import RangesMm
 from server.lab.errors import ServerError
 from server.lab.results import part_of, preview_of, volume_file
 from server.lab.services import Context
+from server.lab.volume_doubts import volume_doubts
 from server.pictures.pictures import Colours
 from server.pictures.previews import VolumePreview
 from server.web.ui.results.looked_at import LookedAt
@@ -33,6 +34,8 @@ class SeenExposure:
         Of the volume.
     preview : VolumePreview
         In short.
+    doubts : tuple of str
+        What speaks against it.
     """
 
     frame: str
@@ -40,6 +43,7 @@ class SeenExposure:
     folder: str
     file: Path
     preview: VolumePreview
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,7 @@ def see(context: Context, looked: LookedAt, names: dict[str, str]) -> list[SeenE
     for frame, name in sorted(names.items()):
         file = volume_file(context.runs.directory(looked.run_id), looked.results_id, name)
         folder = f"/api/runs/{looked.run_id}/results/{looked.results_id}/{name}"
-        seen.append(SeenExposure(frame, name, folder, file, preview_of(file)))
+        seen.append(SeenExposure(frame, name, folder, file, preview_of(file), volume_doubts(file)))
     return seen
 
 

@@ -1,6 +1,7 @@
 """VolumeView: the exposures of a shot as three linked slices and as surfaces in space, by the method one wants."""
 
 import asyncio
+from collections.abc import Sequence
 
 from nicegui import ui
 
@@ -52,6 +53,7 @@ class VolumeView:
                 self._by.props("dense outlined options-dense").classes("by-method")
                 self._with_droplets = ui.switch("droplets", value=True, on_change=self._mark).props("dense")
                 self._state = ui.label("").classes("view-state").props('role=status aria-label="resolution"')
+            self._doubts = ui.label("").classes("text-sm").props('role=status aria-label="doubts of this volume"')
             self._bars = ColourBar()
             with ui.element("div").classes("four-up"):
                 self._slices = SliceGroup()
@@ -119,6 +121,7 @@ class VolumeView:
             return
         if looked == self._looked and chosen == self._exposures.value:  # nobody has gone on meanwhile
             self._seen = seen
+            self._doubts.set_text(doubts_text(seen))
             self._slices.show(seen)
             self._surface.show(seen)
             self._mark()
@@ -156,6 +159,11 @@ class VolumeView:
         dots = {frame: self._dots[frame] for frame in shown}
         self._slices.mark(dots)
         self._surface.mark(dots)
+
+
+def doubts_text(seen: Sequence[SeenExposure]) -> str:
+    """What speaks against the exposures that are shown; empty where nothing does."""
+    return "; ".join(f"exposure {one.frame.upper()}: {doubt}" for one in seen for doubt in one.doubts)
 
 
 def state_text(full: FullSlices, made_by: ReconstructionMethod | None) -> str:
