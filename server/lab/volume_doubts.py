@@ -1,4 +1,4 @@
-"""What speaks against a volume, as its preview keeps it: images that may be wrong, and a calibration of other images."""
+"""What speaks against a volume, as its preview keeps it: images that may be wrong, a calibration of other images."""
 
 import zipfile
 from collections.abc import Iterator, Mapping

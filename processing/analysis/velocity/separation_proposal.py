@@ -9,7 +9,7 @@ from scipy.special import stdtrit
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.estimates import CONFIDENCE, Estimate
-from processing.analysis.shot_doubts import COMPONENTS
+from processing.analysis.shot_doubts import COMPONENTS, velocity_doubts
 from processing.analysis.velocity.common_motion import REACH_VOXEL
 from processing.analysis.velocity.velocity_statistics import velocity_statistics
 from processing.geometry import FloatArray
@@ -39,6 +39,7 @@ class SeparationProposal(FrozenValue):
     will_move_voxel: Annotated[float | None, Field(description="the median droplet, with what is proposed")] = None
     fast_will_move_voxel: Annotated[float | None, Field(description="95 % of the droplets move by less")] = None
     reason: Annotated[str | None, Field(description="why none is proposed, or why not what is wanted")] = None
+    doubts: Annotated[tuple[str, ...], Field(description="velocities that are doubtful, and count, or refused")] = ()
 
 
 def propose_separation(
@@ -60,7 +61,7 @@ def propose_separation(
     rates = [rates_of(shot) for shot in shots]
     known = [one for one in rates if len(one)]
     if not known:
-        return SeparationProposal(shots=0, reason=f"{velocity_statistics(shots).reason}; {REMEDY}")
+        return SeparationProposal(shots=0, reason=f"{velocity_statistics(shots).reason}; {REMEDY}", doubts=velocity_doubts(shots))
     every = np.concatenate(known)
     rate, fast = float(np.median(every)), float(np.quantile(every, FAST_SHARE))
     wanted_ns = moved_voxel / rate
@@ -73,6 +74,7 @@ def propose_separation(
         will_move_voxel=rate * proposed_ns,
         fast_will_move_voxel=fast * proposed_ns,
         reason=reason,
+        doubts=velocity_doubts(shots),
     )
 
 

@@ -50,8 +50,7 @@ def _summary(found: "SeparationProposal") -> str:
     by = f"by {counted(found.pairs, 'pair')} of {counted(found.shots, 'shot')}"
     wanted = "" if found.wanted_ns is None else f" ({_before(found.wanted_ns)})"
     moves = f"the median droplet moves by {found.will_move_voxel:.1f} voxels, 95 % by less than {_fast(found)}"
-    why = f"\n{found.reason}" if found.reason else ""
-    return f"{found.separation_ns} ns{wanted}, {by}: {moves}{why}"
+    return "\n".join([f"{found.separation_ns} ns{wanted}, {by}: {moves}", *filter(None, [found.reason]), *found.doubts])
 
 
 def _before(wanted_ns: "Estimate") -> str:

@@ -14,8 +14,8 @@ from server.lab.jobs.job import Job, JobKind, JobState
 from server.lab.jobs.job_table import JobTable
 from server.lab.jobs.replaced_calibrations import replaced_since
 from server.lab.services import Context
-from server.lab.volume_doubts import TRUSTED, belonging_told
 from server.lab.starting.calibrating import use_calibration
+from server.lab.volume_doubts import TRUSTED, belonging_told
 from server.web.ui.asking import try_to
 from server.web.ui.run.run_panel import outcome_colour
 from server.web.ui.table import table_of

@@ -1,6 +1,7 @@
 """The separation that is proposed lets the median droplet move as far as is wanted, within what cameras accept."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,3 +69,12 @@ def test_without_pairs_there_is_no_proposal_and_its_reason_is_told() -> None:
     assert (found.separation_ns, found.shots) == (None, 0)
     assert "no motion is common to any neighbours" in (found.reason or "")
     assert "a third of the separation" in (found.reason or "")
+
+
+def test_a_proposal_of_doubtful_velocities_says_so() -> None:
+    """Where half of the droplets have no partner, as those that fly too far, the median is that of the slow ones."""
+    said = json.dumps({"verdict": "doubtful", "reasons": ["41 % of the droplets have no partner"], "pairs": 200})
+    shots = [shot(seed, 20.0) for seed in range(3)]
+    doubtful = [replace(one, provenance={**one.provenance, "velocity": said}) for one in shots]
+    assert "41 % of the droplets have no partner" in str(propose_separation(doubtful).model_dump())
+    assert "no partner" not in str(propose_separation(shots).model_dump())
