@@ -88,7 +88,7 @@ LENGTHS = Unchecked(
 RETICLE = Unchecked(
     "whether the reticle of --sizes was seen as these shots are: by the same lenses, focus and light, and with grey "
     "values as much in proportion to light. A gamma of 0.85 in its images alone makes droplets 5 % too large, and "
-    "leaves everything as well explained",
+    "leaves everything as well explained; so do dots of 2 to 5 px that let a tenth of the light pass, 3 to 5 %",
     "nothing where settings of cameras and program were the same for both; else the reticle once more",
 )
 """Of shadows whose diameters are corrected by dots."""
