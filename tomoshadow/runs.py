@@ -11,7 +11,9 @@ from processing.runs.shots import shot_images
 
 
 def read_run(path: str | Path) -> RunReader:
-    """Open a run for reading, recorded or imported, whole or packed into one file, also while it is being recorded.
+    """Open a run for reading, recorded or imported, also while it is being recorded.
+
+    Of one that was packed into one file there are header, references and outcome: read its frames with h5py.
 
     Parameters
     ----------
