@@ -61,7 +61,8 @@ def propose_separation(
     rates = [rates_of(shot) for shot in shots]
     known = [one for one in rates if len(one)]
     if not known:
-        return SeparationProposal(shots=0, reason=f"{velocity_statistics(shots).reason}; {REMEDY}", doubts=velocity_doubts(shots))
+        told = velocity_statistics(shots)
+        return SeparationProposal(shots=0, reason=f"{told.reason}; {REMEDY}", doubts=told.doubts)
     every = np.concatenate(known)
     rate, fast = float(np.median(every)), float(np.quantile(every, FAST_SHARE))
     wanted_ns = moved_voxel / rate
