@@ -60,7 +60,10 @@ def find_spots(values: NDArray[np.float32], least: float, height: float) -> list
 def _flooded(
     values: NDArray[np.float32], level: float, height: float, growing: list[Spot], grown: list[Spot]
 ) -> tuple[list[Spot], list[Spot]]:
-    """Spots that grow on at a level, and those that have met another as tall as a spot must be; less are absorbed."""
+    """Spots that grow on at a level, and those that have met another as tall as a spot must be; less are absorbed.
+
+    How tall one is its last level alone says: what is told of it then.
+    """
     mask = (values > level).astype(np.uint8)
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_32S)
     met = {int(labels[spot.row, spot.column]) for spot in grown}
@@ -69,7 +72,7 @@ def _flooded(
         members.setdefault(int(labels[spot.row, spot.column]), []).append(spot)
     still, ended = [], []
     for label, spots in members.items():
-        tall = [spot for spot in spots if spot.peak - level >= height]
+        tall = [spot for spot in spots if spot.peak - spot.base >= height]
         if label in met or len(tall) > 1:
             ended += tall
         else:

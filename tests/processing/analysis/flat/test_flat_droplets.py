@@ -108,6 +108,16 @@ def test_a_ligament_is_not_round_and_two_droplets_that_overlap_are_flagged() -> 
     assert len(found) == 3
 
 
+@pytest.mark.parametrize(("apart_px", "blur_px"), [(27.5, 0.8), (27.5, 2.0)])
+def test_two_droplets_that_touch_are_both_told(apart_px: float, blur_px: float) -> None:
+    """Neither was, nor were they left out, where the saddle between them lay a fifth below both: images were empty."""
+    pair = [(80.0, 80.0, 30.0), (80.0 + apart_px, 80.0, 24.0)]
+    found = measure_flat(noisy(seen(pair, blur_px=blur_px)))
+    assert (len(found), found.left_out) == (2, {})
+    assert found.overlapping.all()
+    assert sorted(found.diameters_px) == pytest.approx([24, 30], rel=0.06)
+
+
 @pytest.mark.parametrize(("x_px", "blur_px", "flagged"), [(132.0, 16.0, False), (140.0, 7.0, True)])
 def test_a_sharp_droplet_is_sized_before_a_blurred_one_and_told_where_that_reaches_into_it(
     x_px: float, blur_px: float, flagged: bool
