@@ -3,6 +3,7 @@
 import numpy as np
 
 from processing.analysis.flat.flat_droplets import FlatDroplets
+from processing.analysis.flat.soft_edges import soft_edges
 from processing.analysis.flat.unlike_depths import out_of_focus, two_depths
 from processing.geometry import FloatArray
 
@@ -28,6 +29,7 @@ def flat_doubts(found: FlatDroplets) -> list[str]:
         _unmeasured(found) or chosen_by_size(found.diameters_px, found.lacking_px),
         _saturated(found),
         no_discs(found.edge_residuals),
+        soft_edges(found),
         two_depths(found),
         out_of_focus(found),
         crowded(overlapping, found.left_out.get("not_round", 0), len(found)),
