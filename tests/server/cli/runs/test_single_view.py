@@ -56,6 +56,15 @@ def test_images_are_measured_in_pixels(images: list[Path], tmp_path: Path, capsy
     assert "3 droplets in 2 images: too few droplets: means need 5" in text
 
 
+def test_what_makes_bright_particles_too_large_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It was said of their amplitudes alone."""
+    cv2.imwrite(str(tmp_path / "bright.png"), 190 - grey(DISCS))
+    result = told(capsys, "measure", tmp_path / "bright.png", "-o", tmp_path / "out", "--polarity", "bright")
+    said = " ".join(one["what"] for one in result["not_checked"])
+    for words in ("discs of 14 px 6 % too large", "black was cut off", "at full scale", "a median of 9 px"):
+        assert words in said
+
+
 def test_dust_that_counts_in_every_image_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """In real images of a spray half of what was measured as droplets was dust on a window."""
     dust = [(30.0, 30.0, 6.0), (190.0, 40.0, 8.0), (110.0, 130.0, 7.0)]
