@@ -84,8 +84,6 @@ ORDER = Unchecked(
     "[spray] nozzle and direction in the run: statistics and report doubt those against which droplets fly",
 )
 """Of double exposures in a run that does not say where its spray comes from."""
-
-
 LENGTHS = Unchecked(
     "whether calibration and shots were seen by the same lenses at the same focus: a factor of all lengths moves no "
     "view, and no droplet tells it",
@@ -93,8 +91,6 @@ LENGTHS = Unchecked(
     "larger, or smaller, by one factor, places and velocities are, too",
 )
 """Of runs from elsewhere."""
-
-
 RETICLE = Unchecked(
     "whether the reticle of --sizes was seen as these shots are: by the same lenses, focus and light, and with grey "
     "values as much in proportion to light. A gamma of 0.85 in its images alone makes droplets 5 % too large, and "
@@ -102,8 +98,6 @@ RETICLE = Unchecked(
     "nothing where settings of cameras and program were the same for both; else the reticle once more",
 )
 """Of shadows whose diameters are corrected by dots."""
-
-
 DEPTH = Unchecked(
     "whether all images are mirrored left to right or turned by 180 degrees, or views exchanged in pairs: sights "
     "hardly diverge in this volume, and near and far would be exchanged",
@@ -111,16 +105,12 @@ DEPTH = Unchecked(
     "cameras and programs are those of the target",
 )
 """Of a volume that is small against its distance."""
-
-
 SPARSE = Unchecked(
     "whether all images are mirrored left to right or turned by 180 degrees, or views exchanged in pairs: droplets are "
     "too few to tell it, and near and far would be exchanged",
     "more shots, or more droplets in them; or nothing, where settings of cameras and programs are those of the target",
 )
 """Of shots with few droplets."""
-
-
 CROPPED = Unchecked(
     "whether images of target and shots were cut alike: that rows were cut elsewhere in all views moves all droplets "
     "along y, and everything agrees. So it does where all images of the shots, not of the target, are upside down: y, "
@@ -129,8 +119,6 @@ CROPPED = Unchecked(
     "turned as the shots are; [spray] nozzle and direction tell droplets that fly against them",
 )
 """Of images from elsewhere; a rig reads whole images, of target and shots alike."""
-
-
 MOVED = Unchecked(
     "whether all views still look where they did at the target: a frame with all cameras that sank, or a target that "
     "stood elsewhere than was stated, moves all droplets along y, and everything agrees. So it does where all images "
@@ -140,8 +128,6 @@ MOVED = Unchecked(
     "against them",
 )
 """Of runs of a rig: what moves all views alike along y moves no line of sight away from the others."""
-
-
 VALUES: dict[Polarity, Unchecked] = {
     "bright": PROPORTION["bright"],
     "shadow": Unchecked(
