@@ -110,7 +110,8 @@ class EventPublisher:
 
 async def _waited(changed: asyncio.Event) -> bool:
     try:
-        await asyncio.wait_for(changed.wait(), _KEEP_ALIVE_S)
+        async with asyncio.timeout(_KEEP_ALIVE_S):
+            await changed.wait()
     except TimeoutError:
         return False
     return True

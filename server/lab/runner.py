@@ -170,7 +170,8 @@ class JobRunner:
     async def _wait_for_change(self) -> None:
         """Look again after a while even so: a look that failed is not the last one."""
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._changed.wait(), _LOOK_AGAIN_S)
+            async with asyncio.timeout(_LOOK_AGAIN_S):  # wait_for of Python 3.11 forgets that it was cancelled
+                await self._changed.wait()
 
     def _take_up(self) -> None:
         self._remove_unfinished()

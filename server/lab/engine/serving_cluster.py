@@ -144,7 +144,8 @@ async def _await_scheduler(options: WorkerOptions, end: asyncio.Event, tell: Tel
                 tell(f"waits for scheduler {options.scheduler}, {options.wait_s:g} s at most: {error}")
             told = True
         with suppress(TimeoutError):
-            await asyncio.wait_for(end.wait(), _TRY_AGAIN_S)
+            async with asyncio.timeout(_TRY_AGAIN_S):
+                await end.wait()
 
 
 async def _ask(options: WorkerOptions) -> None:

@@ -79,8 +79,22 @@ async def at_work(
         work = asyncio.create_task(runner.run(Duty("processing", events)))
         yield Laboratory(runner, table, events)
         work.cancel()
-        await asyncio.wait([work])
+        await asyncio.wait([work], timeout=DEADLINE_S)
+        assert work.done(), "the work goes on although it was ended"
     table.close()
+
+
+@pytest.mark.parametrize("steps", range(6))
+def test_work_that_is_ended_just_as_a_job_comes_ends(steps: int, tmp_path: Path) -> None:
+    async def go() -> None:
+        async with at_work(tmp_path, answer) as laboratory:
+            await laboratory.reach(laboratory.runner.submit(job_of(0)), JobState.DONE)
+            await asyncio.sleep(0.1)  # it waits for the next one
+            laboratory.runner.submit(job_of(1))
+            for _ in range(steps):
+                await asyncio.sleep(0)
+
+    asyncio.run(go())
 
 
 def test_jobs_are_done_in_the_order_in_which_they_were_asked_for(tmp_path: Path) -> None:
