@@ -24,7 +24,7 @@ from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import Provenance, claim_results
 from processing.runs.single_view.sources import Exposure, FlatSource
 
-COMMAND, METHOD_VERSION = "measure-single-view", 2
+COMMAND, METHOD_VERSION = "measure-single-view", 3
 
 Verdict = Literal["good", "doubtful", "empty", "refused"]
 WORST: tuple[Verdict, ...] = ("refused", "doubtful", "good", "empty")
